@@ -1,0 +1,376 @@
+#pragma once
+
+// What a recorder records: commands that know no API, the resources they name and how each is accessed. The tracker
+// (core/device/detail/tracker.h) reads the accesses alone; a back end replays the commands.
+
+#include <glint/base/error.h>
+#include <glint/device/types.h>
+#include <glint/format/format.h>
+#include <glint/shader/reflection.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace glint::detail {
+
+class Object;
+
+/// Where in the pipeline an access happens. A barrier orders all earlier work of its source stages before all later
+/// work of its destination stages and makes every write of the former visible to the latter.
+enum class Stage : uint8_t {
+    Indirect,      ///< indirect arguments
+    VertexInput,   ///< vertex and index buffers
+    VertexShader,  ///< all shader stages before rasterisation, task and mesh shaders
+    Fragment,
+    ColorTarget,   ///< colour attachments and resolves
+    DepthTarget,   ///< depth and stencil attachments
+    Compute,
+    RayTracing,
+    Copy,          ///< copies, clears, mipmaps
+    Build,         ///< acceleration structures: builds, copies, size queries
+    Host,          ///< reads by the CPU after a wait
+    Count,
+};
+constexpr size_t stage_count = static_cast<size_t>(Stage::Count);
+
+using StageMask = uint16_t;
+constexpr StageMask bit(Stage stage) { return static_cast<StageMask>(1u << static_cast<uint32_t>(stage)); }
+/// Source of an image transition after a semaphore wait or before any use: everything the wait ordered.
+constexpr StageMask stage_all = 0x8000;
+
+enum AccessFlag : uint8_t {
+    AccessRead = 1,
+    AccessWrite = 2,
+    /// A write that keeps nothing of the old contents (whole subresource): the transition may discard them.
+    AccessDiscard = 4,
+};
+
+enum class Layout : uint8_t {
+    Undefined,    ///< contents are lost at the next transition
+    General,      ///< storage image
+    Sampled,
+    ColorTarget,
+    DepthTarget,
+    CopySource,
+    CopyDestination,
+    Present,
+    None,         ///< the resource is not a texture
+};
+
+/// One access of a command to a resource. For textures the slice is resolved: counts are never 0.
+struct Access {
+    uint32_t resource = 0;  ///< index into CommandList::resources
+    Stage stage = Stage::Compute;
+    uint8_t flags = AccessRead;
+    Layout layout = Layout::None;
+    Slice slice;
+};
+
+enum class CommandType : uint8_t {
+    Dispatch, DispatchIndirect,
+    BeginTarget, EndTarget, Draw, DrawIndexed, DrawIndirect, DrawIndexedIndirect,
+    CopyInline,        ///< inline data to a buffer
+    CopyBuffer, FillBuffer,
+    CopyBufferToTexture, CopyTextureToBuffer, CopyTexture, ClearTexture, BlitMipmap,
+    BuildTracing, UpdateTracing, CopyTracing, WriteTracingSize,
+    BeginQuery, EndQuery,
+    PushRegion, PopRegion,
+    Barrier,           ///< explicit full barrier, in untracked sections
+    Count,
+};
+
+/// What every command starts with. `size` is the whole command's bytes, a multiple of 8.
+struct CommandHeader {
+    CommandType type = CommandType::Barrier;
+    bool untracked = false;      ///< the caller looks after hazards; layout transitions still happen
+    uint16_t padding = 0;
+    uint32_t size = 0;
+    uint32_t first_access = 0;   ///< range of CommandList::accesses
+    uint32_t access_count = 0;
+    uint32_t first_shared = 0;   ///< a second range: that of the bindings, shared by commands with the same bindings
+    uint32_t shared_count = 0;
+};
+
+constexpr uint32_t none = 0xffffffffu;
+
+/// One element of a binding block, in the order of BindingLayout::resources, `count` elements each.
+struct BoundResource {
+    uint32_t resource = none;     ///< index into CommandList::resources; none for an inline uniform
+    uint32_t second = none;       ///< sampler of a combined image and sampler
+    uint64_t offset = 0;          ///< bytes into the buffer. Uniforms: 0, theirs is dynamic (below)
+    uint64_t size = 0;            ///< bytes
+    Slice slice;                  ///< textures, resolved
+    Format format = FormatUnknown;  ///< texel buffers
+};
+
+/// The bindings of a dispatch or draw. Commands recorded with unchanged resources share `bound`, so that a back end
+/// that sees the same offset again can keep its descriptors.
+struct Bindings {
+    uint32_t bound = none;        ///< byte offset in CommandList::bytes of the array of BoundResource, none if empty
+    uint32_t bound_count = 0;
+    /// Byte offset in CommandList::bytes of one uint32_t for each uniform element in layout order: its offset into the
+    /// inline data if the element's resource is none, else into its buffer.
+    uint32_t uniform_offsets = none;
+    uint32_t uniform_count = 0;
+    uint32_t push = none;         ///< byte offset in CommandList::bytes of the push constants
+    uint32_t push_size = 0;
+};
+
+struct DispatchCommand {
+    CommandHeader header;
+    uint32_t kernel = 0;
+    Bindings bindings;
+    uint32_t groups[3] = {1, 1, 1};
+};
+
+struct DispatchIndirectCommand {
+    CommandHeader header;
+    uint32_t kernel = 0;
+    Bindings bindings;
+    uint32_t buffer = 0;
+    uint64_t offset = 0;
+};
+
+enum class LoadOperation : uint8_t { Load, Clear, Discard };
+enum class StoreOperation : uint8_t { Store, Discard };
+
+struct Attachment {
+    uint32_t texture = none;
+    uint32_t resolve = none;
+    Slice slice;           ///< one mip level, one or more layers
+    Slice resolve_slice;
+    LoadOperation load = LoadOperation::Clear;
+    StoreOperation store = StoreOperation::Store;
+    float clear[4] = {0, 0, 0, 0};   ///< colour; depth in [0]
+    uint32_t clear_stencil = 0;
+};
+
+constexpr uint32_t max_targets = 8;
+
+struct BeginTargetCommand {
+    CommandHeader header;
+    Attachment colors[max_targets];
+    uint32_t color_count = 0;
+    Attachment depth;
+    uint32_t width = 0;
+    uint32_t height = 0;
+    uint32_t layers = 1;
+};
+
+struct EndTargetCommand {
+    CommandHeader header;
+};
+
+struct VertexBinding {
+    uint32_t buffer = none;
+    uint64_t offset = 0;
+};
+
+struct Viewport {
+    float x = 0, y = 0, width = 0, height = 0, minimum_depth = 0, maximum_depth = 1;
+};
+
+struct Scissor {
+    int32_t x = 0, y = 0;
+    uint32_t width = 0, height = 0;
+};
+
+/// State of a draw. Offsets as in Bindings; an inline vertex or index buffer has resource none and its offset is into
+/// the inline data.
+struct DrawState {
+    uint32_t pipeline = 0;
+    Bindings bindings;
+    uint32_t vertices = none;       ///< byte offset in CommandList::bytes of the array of VertexBinding
+    uint32_t vertex_count = 0;      ///< vertex buffers
+    uint32_t index_buffer = none;
+    uint32_t index_size = 0;        ///< bytes of an index: 2 or 4
+    uint64_t index_offset = 0;
+    uint32_t dynamic = none;        ///< byte offset of a DynamicState; commands with unchanged state share it
+};
+
+struct DynamicState {
+    Viewport viewport;
+    Scissor scissor;
+    float blend[4] = {0, 0, 0, 0};
+    uint32_t stencil_reference = 0;
+};
+
+struct DrawCommand {
+    CommandHeader header;   ///< Draw: vertices; DrawIndexed: indices
+    DrawState state;
+    uint32_t count = 0;
+    uint32_t instances = 1;
+    uint32_t first = 0;     ///< vertex or index
+    int32_t base_vertex = 0;
+    uint32_t first_instance = 0;
+};
+
+struct DrawIndirectCommand {
+    CommandHeader header;   ///< DrawIndirect or DrawIndexedIndirect
+    DrawState state;
+    uint32_t buffer = 0;
+    uint64_t offset = 0;
+    uint32_t draws = 1;
+    uint32_t stride = 0;
+};
+
+struct CopyInlineCommand {
+    CommandHeader header;
+    uint32_t buffer = 0;
+    uint64_t offset = 0;
+    uint32_t data = 0;      ///< offset into the inline data
+    uint64_t size = 0;
+};
+
+struct CopyBufferCommand {
+    CommandHeader header;
+    uint32_t source = 0;
+    uint32_t destination = 0;
+    uint64_t source_offset = 0;
+    uint64_t destination_offset = 0;
+    uint64_t size = 0;
+};
+
+struct FillBufferCommand {
+    CommandHeader header;
+    uint32_t buffer = 0;
+    uint32_t value = 0;
+    uint64_t offset = 0;    ///< multiples of 4
+    uint64_t size = 0;
+};
+
+/// CopyBufferToTexture and CopyTextureToBuffer: one mip level, `slice.layers` layers, tightly packed.
+struct CopyBufferTextureCommand {
+    CommandHeader header;
+    uint32_t buffer = 0;
+    uint32_t texture = 0;
+    uint64_t offset = 0;
+    Slice slice;
+    Region region;          ///< resolved
+};
+
+struct CopyTextureCommand {
+    CommandHeader header;
+    uint32_t source = 0;
+    uint32_t destination = 0;
+    Slice source_slice;
+    Slice destination_slice;
+    Region source_region;   ///< resolved
+    uint32_t x = 0, y = 0, z = 0;
+};
+
+struct ClearTextureCommand {
+    CommandHeader header;
+    uint32_t texture = 0;
+    Slice slice;
+    union {
+        float f[4];
+        uint32_t u[4];
+    } value = {};           ///< by the format's type; depth in f[0], stencil in u[1]
+};
+
+/// Fills `slice.mip` from the level below it, `slice.layers` layers, linear filter.
+struct BlitMipmapCommand {
+    CommandHeader header;
+    uint32_t texture = 0;
+    Slice slice;
+};
+
+/// BuildTracing and UpdateTracing. Geometry comes from the Tracing object; instances from `instances`.
+struct BuildTracingCommand {
+    CommandHeader header;
+    uint32_t tracing = 0;
+    uint32_t scratch = 0;           ///< buffer
+    uint64_t scratch_offset = 0;
+    uint32_t instances = none;      ///< buffer of native instance records
+    uint64_t instances_offset = 0;
+    uint32_t instance_count = 0;
+};
+
+struct CopyTracingCommand {
+    CommandHeader header;
+    uint32_t source = 0;
+    uint32_t destination = 0;
+    bool compact = false;
+};
+
+/// Compacted size of a built structure into a query slot owned by the native structure.
+struct WriteTracingSizeCommand {
+    CommandHeader header;
+    uint32_t tracing = 0;
+};
+
+struct QueryCommand {
+    CommandHeader header;
+    uint32_t query = 0;
+};
+
+struct RegionCommand {
+    CommandHeader header;
+    uint32_t name = 0;      ///< byte offset in CommandList::bytes of a zero-terminated string
+};
+
+struct BarrierCommand {
+    CommandHeader header;
+};
+
+/// A closed list is constant until it is recycled. Buffers keep their capacity, so that a warm frame allocates nothing.
+struct CommandList {
+    std::vector<std::byte> bytes;         ///< command payloads that commands point into: bindings, names
+    std::vector<std::byte> commands;      ///< commands one after the other, each a multiple of 8 bytes
+    std::vector<Access> accesses;
+    std::vector<Object*> resources;       ///< one reference held for each
+    std::vector<std::byte> inline_data;   ///< uploaded at submit, to an address aligned to 256 bytes
+    uint32_t command_count = 0;
+    uint32_t region_depth = 0;
+    std::string label;                    ///< of the recorder, for debuggers and lost-device messages
+    Error error;
+
+    template <class T>
+    const T* at(uint32_t offset) const {
+        return reinterpret_cast<const T*>(bytes.data() + offset);
+    }
+};
+
+/// Calls visit(index, const CommandHeader&) for each command in order; cast by header.type.
+template <class Visitor>
+void forEachCommand(const CommandList& list, Visitor&& visit) {
+    const std::byte* position = list.commands.data();
+    for (uint32_t i = 0; i < list.command_count; i++) {
+        const auto* header = reinterpret_cast<const CommandHeader*>(position);
+        visit(i, *header);
+        position += header->size;
+    }
+}
+
+/// A transition of one slice of one texture.
+struct ImageBarrier {
+    uint32_t resource = 0;
+    Slice slice;
+    Layout from = Layout::Undefined;
+    Layout to = Layout::Undefined;
+    StageMask source = 0;        ///< 0: nothing to wait for; stage_all: after the semaphore waits of the submission
+    StageMask destination = 0;
+};
+
+/// What has to happen before a command: one memory barrier over everything and any number of image transitions.
+struct Barrier {
+    uint32_t command = 0;        ///< index of the command it precedes; command_count for the end of the list
+    StageMask source = 0;        ///< both 0: no memory barrier
+    StageMask destination = 0;
+    uint32_t first_image = 0;    ///< range of ResolvedList::images
+    uint32_t image_count = 0;
+    bool split = false;          ///< within a target: end it (storing), apply the barrier, begin it again (loading)
+};
+
+/// A list and the barriers the tracker found for it, in order of commands (at most one Barrier a command).
+struct ResolvedList {
+    const CommandList* list = nullptr;
+    std::span<const Barrier> barriers;
+    std::span<const ImageBarrier> images;
+};
+
+}  // namespace glint::detail

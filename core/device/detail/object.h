@@ -1,0 +1,212 @@
+#pragma once
+
+// The objects behind the handles.
+
+#include <glint/base/error.h>
+#include <glint/device/detail/backend.h>
+#include <glint/device/handle.h>
+#include <glint/shader/shader_compiler.h>
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace glint::detail {
+
+class DeviceObject;
+
+enum class ObjectType : uint8_t {
+    Device, Buffer, Texture, Sampler, Shader, Kernel, Pipeline, Target, Tracing, Query, Fence,
+};
+const char* toString(ObjectType type);
+
+/// State the tracker keeps for a buffer, a tracing or one texture subresource. Guarded by the device's submit lock.
+struct ResourceState {
+    struct Reads {
+        uint64_t value = 0;       ///< time-line value of the last submission that read it on this queue
+        uint64_t position = 0;    ///< position of the last read on this queue
+        StageMask stages = 0;     ///< that read it since the last write
+    };
+    uint64_t write_value = 0;     ///< submission of the last write
+    uint64_t write_position = 0;
+    StageMask write_stages = 0;   ///< 0: never written
+    StageMask visible = 0;        ///< stages that a transition already made the write visible to
+    Queue write_queue = Queue::Main;
+    Layout layout = Layout::Undefined;
+    Reads reads[queue_count];
+    uint64_t epoch = 0;           ///< submission that touched it last, for the undo log
+};
+
+class Object {
+public:
+    /// `device` is null for objects that live without one (Device itself, Shader).
+    Object(ObjectType type, DeviceObject* device);
+    Object(const Object&) = delete;
+    Object& operator=(const Object&) = delete;
+
+    void retain() { references_.fetch_add(1, std::memory_order_relaxed); }
+    void release();
+
+    ObjectType type() const { return type_; }
+    DeviceObject* device() const { return device_; }
+
+    ObjectState state() const { return state_.load(std::memory_order_acquire); }
+    void setReady() { state_.store(ObjectState::Ready, std::memory_order_release); }
+    /// Keeps the first error and tells the device's message callback. Returns the error it keeps.
+    Error fail(Error error);
+    Error error() const;
+
+    std::string name() const;
+    /// "storage buffer 'values'": the type and the name, for messages.
+    std::string label() const;
+    void setName(std::string_view name);
+
+    /// Where in a submitted list the GPU uses it last, for each queue. Guarded by the submit lock.
+    std::array<uint64_t, queue_count> last_use = {};
+
+    std::unique_ptr<Native> native;
+
+protected:
+    virtual ~Object();
+
+private:
+    std::atomic<uint32_t> references_ = 1;
+    std::atomic<ObjectState> state_ = ObjectState::Building;
+    const ObjectType type_;
+    DeviceObject* const device_;
+    mutable std::mutex mutex_;  // of error_ and name_
+    Error error_;
+    std::string name_;
+};
+
+/// An owning pointer to an object, for Glint's own sources.
+template <class T>
+class Ref {
+public:
+    Ref() = default;
+    explicit Ref(T* object) : object_(object) {
+        if (object_) object_->retain();
+    }
+    Ref(const Ref& other) : Ref(other.object_) {}
+    Ref(Ref&& other) noexcept : object_(other.object_) { other.object_ = nullptr; }
+    Ref& operator=(Ref other) noexcept {
+        std::swap(object_, other.object_);
+        return *this;
+    }
+    ~Ref() {
+        if (object_) object_->release();
+    }
+    T* get() const { return object_; }
+    T* operator->() const { return object_; }
+    T& operator*() const { return *object_; }
+    explicit operator bool() const { return object_ != nullptr; }
+
+private:
+    T* object_ = nullptr;
+};
+
+class BufferObject final : public Object {
+public:
+    explicit BufferObject(DeviceObject* device) : Object(ObjectType::Buffer, device) {}
+    NativeBuffer* nativeBuffer() const { return static_cast<NativeBuffer*>(native.get()); }
+
+    uint64_t size = 0;
+    Buffer::Flags flags = 0;
+    ResourceState use;
+};
+
+class TextureObject final : public Object {
+public:
+    explicit TextureObject(DeviceObject* device) : Object(ObjectType::Texture, device) {}
+    NativeTexture* nativeTexture() const { return static_cast<NativeTexture*>(native.get()); }
+    ResourceState& use(uint32_t mip, uint32_t layer) { return uses[layer * desc.mipmaps + mip]; }
+
+    TextureDesc desc;                 ///< mipmaps resolved, layers counts faces
+    uint32_t samples = 1;
+    std::vector<ResourceState> uses;  ///< one for each subresource, layer-major
+};
+
+class SamplerObject final : public Object {
+public:
+    explicit SamplerObject(DeviceObject* device) : Object(ObjectType::Sampler, device) {}
+};
+
+class ShaderObject final : public Object {
+public:
+    ShaderObject() : Object(ObjectType::Shader, nullptr) {}
+
+    ShaderSource source;
+    CompiledShader compiled;
+};
+
+/// What a Kernel and a Pipeline have in common.
+class ProgramObject : public Object {
+public:
+    ProgramObject(ObjectType type, DeviceObject* device) : Object(type, device) {}
+
+    std::vector<Ref<ShaderObject>> shaders;
+    std::vector<std::pair<std::string, SpecializationValue>> constants;  ///< by name where it is not empty
+    std::array<int32_t, static_cast<size_t>(SlotKind::Count)> declared = {-1, -1, -1, -1, -1, -1, -1, -1};
+    BindingLayout layout;
+    /// Where element 0 of BindingLayout::resources[i] stands in a binding block.
+    std::vector<uint32_t> first_element;
+    uint32_t element_count = 0;
+    uint32_t uniform_elements = 0;
+};
+
+class KernelObject final : public ProgramObject {
+public:
+    explicit KernelObject(DeviceObject* device) : ProgramObject(ObjectType::Kernel, device) {}
+    NativeKernel* nativeKernel() const { return static_cast<NativeKernel*>(native.get()); }
+
+    std::array<uint32_t, 3> group_size = {1, 1, 1};
+};
+
+class PipelineObject final : public ProgramObject {
+public:
+    explicit PipelineObject(DeviceObject* device) : ProgramObject(ObjectType::Pipeline, device) {}
+    NativePipeline* nativePipeline() const { return static_cast<NativePipeline*>(native.get()); }
+
+    PipelineDesc desc;  ///< stages and layout are filled by create()
+};
+
+class QueryObject final : public Object {
+public:
+    QueryObject(DeviceObject* device, Query::Type type) : Object(ObjectType::Query, device), query_type(type) {}
+    NativeQuery* nativeQuery() const { return static_cast<NativeQuery*>(native.get()); }
+
+    const Query::Type query_type;
+    ResourceState use;                ///< unused by the tracker; last_use says when a result is there
+};
+
+class TracingObject final : public Object {
+public:
+    explicit TracingObject(DeviceObject* device) : Object(ObjectType::Tracing, device) {}
+    NativeTracing* nativeTracing() const { return static_cast<NativeTracing*>(native.get()); }
+
+    Tracing::Type tracing_type = Tracing::TypeTriangle;
+    Tracing::Flags flags = 0;
+    std::vector<TracingGeometry> geometries;
+    std::vector<Ref<BufferObject>> buffers;        ///< every buffer the geometries name
+    uint32_t instances = 0;                        ///< capacity of a top level
+    uint32_t instance_count = 0;                   ///< set by setTracing
+    std::vector<Ref<TracingObject>> references;    ///< bottom levels the instances refer to, each once
+    Ref<BufferObject> instance_buffer;             ///< native records
+    bool built = false;
+    ResourceState use;
+};
+
+class FenceObject final : public Object {
+public:
+    explicit FenceObject(DeviceObject* device) : Object(ObjectType::Fence, device) {}
+
+    std::mutex mutex;
+    std::array<uint64_t, queue_count> values = {};  ///< time-line values it stands for
+};
+
+}  // namespace glint::detail

@@ -1,0 +1,32 @@
+# Everything comes from the distribution; see `./dev setup --list`.
+
+find_package(Threads REQUIRED)  # glslang's package refers to it without finding it
+find_package(VulkanHeaders CONFIG REQUIRED)
+find_package(SPIRV-Tools CONFIG REQUIRED)
+find_package(SPIRV-Tools-opt CONFIG REQUIRED)
+find_package(SPIRV-Tools-link CONFIG QUIET)
+find_package(glslang CONFIG REQUIRED)
+foreach(part core glsl hlsl msl)
+    find_package(spirv_cross_${part} CONFIG REQUIRED)
+endforeach()
+find_package(fmt CONFIG REQUIRED)
+find_package(glm CONFIG REQUIRED)
+find_package(tl-expected CONFIG REQUIRED)
+find_package(nlohmann_json CONFIG REQUIRED)
+find_package(CLI11 CONFIG REQUIRED)
+find_package(PNG REQUIRED)
+find_package(tinyobjloader CONFIG REQUIRED)
+
+find_path(GLINT_VMA_INCLUDE_DIR vk_mem_alloc.h REQUIRED)
+add_library(glint_vma INTERFACE)
+target_include_directories(glint_vma SYSTEM INTERFACE "${GLINT_VMA_INCLUDE_DIR}")
+
+find_path(GLINT_VOLK_INCLUDE_DIR volk.h REQUIRED)
+target_include_directories(glint_vma SYSTEM INTERFACE "${GLINT_VOLK_INCLUDE_DIR}")
+target_compile_definitions(glint_vma INTERFACE VK_NO_PROTOTYPES)
+
+find_path(GLINT_XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
+find_library(GLINT_XXHASH_LIBRARY xxhash REQUIRED)
+add_library(glint_xxhash INTERFACE)
+target_include_directories(glint_xxhash SYSTEM INTERFACE "${GLINT_XXHASH_INCLUDE_DIR}")
+target_link_libraries(glint_xxhash INTERFACE "${GLINT_XXHASH_LIBRARY}")

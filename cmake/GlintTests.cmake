@@ -1,0 +1,34 @@
+# glint_test(name labels sources...): a GoogleTest program and its ctest entry. Suites whose name ends in `Long` go to a
+# second entry, labelled `long`, if there are any.
+
+set(GLINT_TEST_TIMEOUT 900)
+
+function(glint_test name labels)
+    add_executable(${name} ${ARGN})
+    target_link_libraries(${name} PRIVATE glint_options test_support)
+    if(NOT EXISTS "${PROJECT_SOURCE_DIR}/tests/support/main.cpp")
+        target_link_libraries(${name} PRIVATE GTest::gtest_main)
+    endif()
+    add_test(NAME ${name} COMMAND ${name} --gtest_brief=1 "--gtest_filter=-*Long.*:*Long/*")
+    set(environment "")
+    if(GLINT_SANITIZE)
+        set(folder "${PROJECT_SOURCE_DIR}/cmake/sanitizers")
+        set(environment
+            "ASAN_OPTIONS=detect_leaks=1:check_initialization_order=1:strict_init_order=1"
+            "LSAN_OPTIONS=suppressions=${folder}/lsan.supp:print_suppressions=0"
+            "UBSAN_OPTIONS=print_stacktrace=1"
+            "TSAN_OPTIONS=halt_on_error=1:second_deadlock_stack=1")
+    endif()
+    set_tests_properties(${name} PROPERTIES LABELS "${labels}" TIMEOUT ${GLINT_TEST_TIMEOUT} ENVIRONMENT "${environment}")
+
+    set(long "")
+    foreach(source IN LISTS ARGN)
+        file(STRINGS "${source}" found REGEX "^(TEST|TEST_F|TEST_P|TYPED_TEST)\\([A-Za-z0-9_]*Long,")
+        list(APPEND long ${found})
+    endforeach()
+    if(long)
+        add_test(NAME ${name}_long COMMAND ${name} --gtest_brief=1 "--gtest_filter=*Long.*:*Long/*")
+        set_tests_properties(${name}_long PROPERTIES
+            LABELS "${labels};long" TIMEOUT 7200 ENVIRONMENT "${environment}")
+    endif()
+endfunction()

@@ -1,0 +1,93 @@
+#pragma once
+
+// The object behind Device: the back end, the submit path, and what waits to be released.
+
+#include <glint/device/detail/backend.h>
+#include <glint/device/detail/object.h>
+#include <glint/device/detail/tracker.h>
+#include <glint/device/device.h>
+
+#include <memory>
+#include <mutex>
+#include <source_location>
+#include <vector>
+
+namespace glint::detail {
+
+class RecorderCore;
+
+class DeviceObject final : public Object {
+public:
+    using Where = std::source_location;
+
+    DeviceObject() : Object(ObjectType::Device, nullptr) {}
+    ~DeviceObject() override;
+
+    Status open(const DeviceDesc& desc, Where where);
+    /// Takes a back end that exists already: foreign handles.
+    Status adopt(std::unique_ptr<Backend> backend, MessageCallback message);
+
+    const Features& features() const { return backend->features(); }
+    const DeviceInfo& info() const { return backend->info(); }
+
+    /// Tells the message callback.
+    void report(const Error& error, Message::Severity severity = Message::Severity::Error) const;
+
+    /// Deletes a native object once the submissions in `last_use` are done.
+    void retire(std::unique_ptr<Native> native, const std::array<uint64_t, queue_count>& last_use);
+    /// Gives an object another native one between submissions; the old one is retired.
+    void replaceNative(Object& object, std::unique_ptr<Native> native);
+    /// Deletes what the GPU has passed.
+    void collect();
+
+    /// A recorder from the pool, empty.
+    RecorderPtr acquireRecorder(Queue queue, std::string_view name, Where where);
+    void recycleRecorder(RecorderCore* core);
+
+    /// Runs `record(RecorderCore&)` on the list of queued transfers.
+    template <class Record>
+    void transfer(Record&& record) {
+        std::lock_guard lock(transfer_mutex_);
+        if (!transfers_) transfers_ = acquireRecorder(Queue::Main, "transfers", Where::current());
+        record(*transfers_);
+    }
+
+    Status submit(std::span<RecorderCore* const> recorders, FenceObject* fence, Where where);
+    Status flush(Where where) { return submit({}, nullptr, where); }
+    /// Waits for every submission so far.
+    Status waitIdle(Where where);
+    Status wait(const std::array<uint64_t, queue_count>& values, uint64_t nanoseconds, Where where);
+    bool isDone(const std::array<uint64_t, queue_count>& values);
+
+    /// Host-visible memory for an upload or a read-back; kept alive by the list that uses it.
+    Expected<Ref<BufferObject>> createStaging(uint64_t size, bool readback, Where where);
+
+    std::unique_ptr<Backend> backend;
+
+private:
+    struct Retired {
+        std::unique_ptr<Native> native;
+        std::array<uint64_t, queue_count> last_use;
+    };
+
+    Status submitLocked(std::span<RecorderCore* const> recorders, Queue queue, Where where);
+
+    MessageCallback message_;
+
+    std::mutex submit_mutex_;                        // of tracker_, next_value_, scratch below, last_use of objects
+    Tracker tracker_;
+    std::array<uint64_t, queue_count> next_value_ = {};  // last value submitted
+    std::vector<const CommandList*> lists_;
+    bool lost_ = false;
+
+    std::mutex transfer_mutex_;                      // of transfers_; taken before submit_mutex_
+    RecorderPtr transfers_;
+
+    std::mutex retired_mutex_;
+    std::vector<Retired> retired_;
+
+    std::mutex recorder_mutex_;
+    std::vector<RecorderCore*> recorders_;           // idle
+};
+
+}  // namespace glint::detail

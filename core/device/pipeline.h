@@ -1,0 +1,101 @@
+#pragma once
+
+#include <glint/device/program.h>
+#include <glint/device/types.h>
+#include <glint/format/format.h>
+
+namespace glint {
+
+/// A graphics pipeline. Created by Device::createPipeline, configured, then create().
+///
+/// Conventions: clip-space Y points up, depth runs from 0 to 1, row 0 of a target is its top row; front faces are
+/// counter-clockwise as seen on the picture unless setFrontMode says otherwise. Nothing is culled by default.
+class Pipeline : public Program {
+public:
+    enum Attribute : uint8_t {
+        AttributePosition, AttributeBasis, AttributeNormal, AttributeTangent, AttributeTexCoord, AttributeWeights,
+        AttributeJoints, AttributeColor, AttributeCustom,
+    };
+    enum PrimitiveType : uint8_t {
+        PrimitivePoint, PrimitiveLine, PrimitiveLineStrip, PrimitiveTriangle, PrimitiveTriangleStrip, PrimitivePatch,
+    };
+    enum FillModeType : uint8_t { FillModeSolid, FillModeLine };
+    enum CullModeType : uint8_t { CullModeNone, CullModeBack, CullModeFront };
+    enum FrontModeType : uint8_t { FrontModeCCW, FrontModeCW };
+    enum DepthFunc : uint8_t {
+        DepthFuncNever, DepthFuncLess, DepthFuncEqual, DepthFuncLessEqual, DepthFuncGreater, DepthFuncNotEqual,
+        DepthFuncGreaterEqual, DepthFuncAlways,
+        DepthFuncNone,  ///< no depth test
+    };
+    enum BlendOp : uint8_t { BlendOpAdd, BlendOpSub, BlendOpRevSub, BlendOpMin, BlendOpMax, BlendOpNone };
+    enum BlendFunc : uint8_t {
+        BlendFuncZero, BlendFuncOne, BlendFuncSrcColor, BlendFuncInvSrcColor, BlendFuncSrcAlpha, BlendFuncInvSrcAlpha,
+        BlendFuncDestColor, BlendFuncInvDestColor, BlendFuncDestAlpha, BlendFuncInvDestAlpha, BlendFuncFactor,
+        BlendFuncInvFactor,
+    };
+    enum StencilOp : uint8_t {
+        StencilOpKeep, StencilOpZero, StencilOpReplace, StencilOpInvert, StencilOpIncrWrap, StencilOpDecrWrap,
+        StencilOpIncrSat, StencilOpDecrSat,
+    };
+    enum ColorMask : uint8_t {
+        ColorMaskNone = 0, ColorMaskR = 1, ColorMaskG = 2, ColorMaskB = 4, ColorMaskA = 8, ColorMaskAll = 15,
+    };
+
+    Pipeline() = default;
+    explicit Pipeline(detail::Object* object) : Program(object) {}
+
+    /// Loads and compiles one stage. True if that worked; otherwise the error is kept for create().
+    bool loadShaderGLSL(Shader::Type type, std::string_view path, std::string_view macros = {},
+                        Where where = Where::current()) {
+        return load(Shader::loadGLSL(type, path, macros, where), where);
+    }
+    bool createShaderGLSL(Shader::Type type, std::string_view text, std::string_view macros = {},
+                          Where where = Where::current()) {
+        return load(Shader::createGLSL(type, text, macros, "pipeline", where), where);
+    }
+    bool loadShaderSPIRV(Shader::Type type, std::string_view path, Where where = Where::current()) {
+        return load(Shader::loadSPIRV(type, path, where), where);
+    }
+
+    /// Optional declarations: slot `index` of a kind exists and is seen by the stages of `mask`; create() checks them
+    /// against the shaders ("program.slots", "program.mask").
+    void setUniformMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setStorageMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setStorageMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where = Where::current());
+    void setTextureMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setTextureMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where = Where::current());
+    void setSurfaceMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setSamplerMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setTracingMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setTexelMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+
+    /// Adds the next attribute: locations count up from 0 in the order of the calls. `buffer` is the slot of
+    /// Command::setVertexBuffer; `rate` 0 steps by vertex, 1 by instance. Errors: "pipeline.attribute".
+    void addAttribute(Attribute attribute, Format format, uint32_t buffer, uint32_t offset, uint32_t stride,
+                      uint32_t rate = 0, Where where = Where::current());
+
+    void setPrimitive(PrimitiveType primitive);
+    void setFillMode(FillModeType mode);
+    void setCullMode(CullModeType mode);
+    void setFrontMode(FrontModeType mode);
+    void setDepthFunc(DepthFunc func);
+    void setDepthMask(bool write);
+    void setDepthBias(float bias, float slope);
+    /// Fragments beyond the depth range are kept, their depth clamped; needs FeatureDepthClamp.
+    void setDepthClamp(bool enabled);
+    void setStencilFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass);
+    void setStencilMask(uint8_t read, uint8_t write);
+    /// Blending of all colour targets, colour and alpha alike.
+    void setBlend(BlendOp op, BlendFunc source, BlendFunc destination);
+    void setBlendColor(uint32_t index, BlendOp op, BlendFunc source, BlendFunc destination);
+    void setBlendAlpha(uint32_t index, BlendOp op, BlendFunc source, BlendFunc destination);
+    void setColorMask(uint8_t mask, uint32_t index = 0);
+    /// Formats of the targets that the pipeline draws to; FormatUnknown removes one.
+    void setColorFormat(Format format, uint32_t index = 0, Where where = Where::current());
+    void setDepthFormat(Format format, Where where = Where::current());
+    /// Samples a pixel: 1, 2, 4 or 8.
+    void setMultisample(uint32_t samples, Where where = Where::current());
+    void setAlphaToCoverage(bool enabled);
+};
+
+}  // namespace glint

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <glint/base/expected.h>
+#include <glint/base/status.h>
+#include <glint/math/bounds.h>
+#include <glint/math/math.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace glint {
+
+/// A named run of a mesh's triangles.
+struct MeshPart {
+    std::string name;
+    uint32_t first_index = 0;  ///< a multiple of 3
+    uint32_t index_count = 0;  ///< a multiple of 3
+    bool operator==(const MeshPart&) const = default;
+};
+
+/// Indexed triangles in host memory. A plain value: fill the arrays, or load a file; valid when validate() says so.
+/// Front faces are counter-clockwise in a right-handed world, unless the file's author thought otherwise.
+struct Mesh {
+    /// Largest number of bytes of a file, and of the mesh made from it, unless the caller says otherwise.
+    static constexpr uint64_t default_limit = 1ull << 32;
+
+    std::vector<Vector3f> positions;
+    std::vector<Vector3f> normals;    ///< empty, or one of unit length for each position
+    std::vector<Vector2f> texcoords;  ///< empty, or one for each position
+    std::vector<uint32_t> indices;    ///< three for each triangle
+    std::vector<MeshPart> parts;      ///< in the order of their triangles; empty means one part without a name
+
+    /// Reads a file; its ending says which format it has (".obj", see parseObj). Degenerate and repeated triangles are
+    /// kept, and triangles keep the order of the file. Errors: those of readFile, "mesh.unknown_extension" and those of
+    /// the format; they name the file and the line.
+    static Expected<Mesh> load(const std::filesystem::path& path, uint64_t limit = default_limit);
+
+    size_t triangleCount() const { return indices.size() / 3; }
+
+    /// Errors: "mesh.no_faces", "mesh.index_count" (no multiple of 3), "mesh.index_range", "mesh.attribute_count"
+    /// (normals or texture coordinates that are not as many as the positions), "mesh.not_finite" (a coordinate of a
+    /// position is NaN or infinite), "mesh.part_range" (parts that are out of order, overlap or end past the indices).
+    Status validate() const;
+
+    /// The box of all positions, also of those that no triangle uses.
+    BoundBox bounds() const { return BoundBox(positions); }
+
+    /// Replaces the normals: at each vertex the mean of its triangles' normals, weighted by their areas, of unit length.
+    /// (0, 0, 1) where no triangle of nonzero area meets the vertex. Indices have to be in range.
+    void createNormals();
+
+    bool operator==(const Mesh&) const = default;
+};
+
+/// Reads a Wavefront OBJ file's text: `v`, `vt`, `vn`, `f` (with indices from the start or, negative, from the end) and
+/// `o` and `g`, each of which begins a part. Materials, curves, lines and points are passed over.
+///
+/// - A vertex is made of each distinct triple of indices, in the order of first use; positions in no face are left out.
+/// - Polygons of up to 1024 corners are split into triangles, concave ones too, if they are flat and do not cross
+///   themselves; the split goes along existing corners, and a polygon of n corners always gives n - 2 triangles.
+/// - Normals and texture coordinates are kept if every corner of every face has them, otherwise they are left out with
+///   the warning "mesh.attribute_dropped". Normals are brought to unit length; one of length zero becomes (0, 0, 1).
+/// - Numbers are rounded correctly to float32.
+///
+/// `name` names the file in errors; every error has the line. The mesh may take `limit` bytes; beside it the reader takes
+/// at most 64 bytes for each byte of text.
+/// Errors: "mesh.empty_file", "mesh.no_faces", "mesh.syntax" (a number is missing or malformed), "mesh.index_range" (an
+/// index is 0 or names nothing that stands above it), "mesh.not_finite", "mesh.face_corners" (fewer than 3 or more than
+/// 1024), "mesh.too_large".
+Expected<Mesh> parseObj(std::string_view text, const std::string& name, uint64_t limit = Mesh::default_limit);
+
+/// Splits a polygon, given by its corners in order, into n - 2 triangles: three numbers of corners for each, turning as
+/// the polygon does. Right for flat polygons that do not cross themselves, convex or not; others give some triangulation.
+/// Time grows with the square of the corners, for hostile ones with the cube. Empty for fewer than three corners.
+std::vector<uint32_t> triangulatePolygon(std::span<const Vector3f> corners);
+
+}  // namespace glint

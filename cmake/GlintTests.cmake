@@ -21,6 +21,10 @@ function(glint_test name labels)
     endif()
     set_tests_properties(${name} PROPERTIES LABELS "${labels}" TIMEOUT ${GLINT_TEST_TIMEOUT} ENVIRONMENT "${environment}")
 
+    if("driverless" IN_LIST labels)
+        add_dependencies(driverless_tests ${name})
+    endif()
+
     set(long "")
     foreach(source IN LISTS ARGN)
         file(STRINGS "${source}" found REGEX "^(TEST|TEST_F|TEST_P|TYPED_TEST)\\([A-Za-z0-9_]*Long,")

@@ -19,6 +19,8 @@ endif()
 add_library(glint_options INTERFACE)
 target_compile_options(glint_options INTERFACE
     -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Woverloaded-virtual
+    # Vulkan's structures are meant to be filled in part.
+    -Wno-missing-field-initializers
     # Contracted multiply-adds would make error bounds, and results, depend on the target.
     -ffp-contract=off)
 if(GLINT_WARNINGS_AS_ERRORS)

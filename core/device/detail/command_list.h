@@ -75,7 +75,7 @@ enum class CommandType : uint8_t {
     CopyInline,        ///< inline data to a buffer
     CopyBuffer, FillBuffer,
     CopyBufferToTexture, CopyTextureToBuffer, CopyTexture, ClearTexture, BlitMipmap,
-    BuildTracing, UpdateTracing, CopyTracing, WriteTracingSize,
+    BuildTracings, CopyTracing, WriteTracingSize,
     BeginQuery, EndQuery,
     PushRegion, PopRegion,
     Barrier,           ///< explicit full barrier, in untracked sections
@@ -279,15 +279,22 @@ struct BlitMipmapCommand {
     Slice slice;
 };
 
-/// BuildTracing and UpdateTracing. Geometry comes from the Tracing object; instances from `instances`.
-struct BuildTracingCommand {
-    CommandHeader header;
+/// One build or update. Geometry comes from the Tracing object; instances from `instances`.
+struct TracingBuild {
     uint32_t tracing = 0;
+    bool update = false;
     uint32_t scratch = 0;           ///< buffer
     uint64_t scratch_offset = 0;
     uint32_t instances = none;      ///< buffer of native instance records
     uint64_t instances_offset = 0;
     uint32_t instance_count = 0;
+};
+
+/// Builds that may run side by side: their scratch ranges are apart and none refers to another.
+struct BuildTracingsCommand {
+    CommandHeader header;
+    uint32_t builds = 0;            ///< byte offset in CommandList::bytes of an array of TracingBuild
+    uint32_t count = 0;
 };
 
 struct CopyTracingCommand {

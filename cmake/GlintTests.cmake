@@ -12,6 +12,7 @@ function(glint_test name labels)
     add_test(NAME ${name} COMMAND ${name} --gtest_brief=1 "--gtest_filter=-*Long.*:*Long/*")
     set(environment "")
     if(GLINT_SANITIZE)
+        target_sources(${name} PRIVATE "${PROJECT_SOURCE_DIR}/cmake/sanitizers/keep_loaded.cpp")
         set(folder "${PROJECT_SOURCE_DIR}/cmake/sanitizers")
         set(environment
             "ASAN_OPTIONS=detect_leaks=1:check_initialization_order=1:strict_init_order=1"

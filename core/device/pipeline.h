@@ -13,32 +13,70 @@ namespace glint {
 class Pipeline : public Program {
 public:
     enum Attribute : uint8_t {
-        AttributePosition, AttributeBasis, AttributeNormal, AttributeTangent, AttributeTexCoord, AttributeWeights,
-        AttributeJoints, AttributeColor, AttributeCustom,
+        AttributePosition,
+        AttributeBasis,
+        AttributeNormal,
+        AttributeTangent,
+        AttributeTexCoord,
+        AttributeWeights,
+        AttributeJoints,
+        AttributeColor,
+        AttributeCustom,
     };
     enum PrimitiveType : uint8_t {
-        PrimitivePoint, PrimitiveLine, PrimitiveLineStrip, PrimitiveTriangle, PrimitiveTriangleStrip, PrimitivePatch,
+        PrimitivePoint,
+        PrimitiveLine,
+        PrimitiveLineStrip,
+        PrimitiveTriangle,
+        PrimitiveTriangleStrip,
+        PrimitivePatch,
     };
     enum FillModeType : uint8_t { FillModeSolid, FillModeLine };
     enum CullModeType : uint8_t { CullModeNone, CullModeBack, CullModeFront };
     enum FrontModeType : uint8_t { FrontModeCCW, FrontModeCW };
     enum DepthFunc : uint8_t {
-        DepthFuncNever, DepthFuncLess, DepthFuncEqual, DepthFuncLessEqual, DepthFuncGreater, DepthFuncNotEqual,
-        DepthFuncGreaterEqual, DepthFuncAlways,
+        DepthFuncNever,
+        DepthFuncLess,
+        DepthFuncEqual,
+        DepthFuncLessEqual,
+        DepthFuncGreater,
+        DepthFuncNotEqual,
+        DepthFuncGreaterEqual,
+        DepthFuncAlways,
         DepthFuncNone,  ///< no depth test
     };
     enum BlendOp : uint8_t { BlendOpAdd, BlendOpSub, BlendOpRevSub, BlendOpMin, BlendOpMax, BlendOpNone };
     enum BlendFunc : uint8_t {
-        BlendFuncZero, BlendFuncOne, BlendFuncSrcColor, BlendFuncInvSrcColor, BlendFuncSrcAlpha, BlendFuncInvSrcAlpha,
-        BlendFuncDestColor, BlendFuncInvDestColor, BlendFuncDestAlpha, BlendFuncInvDestAlpha, BlendFuncFactor,
+        BlendFuncZero,
+        BlendFuncOne,
+        BlendFuncSrcColor,
+        BlendFuncInvSrcColor,
+        BlendFuncSrcAlpha,
+        BlendFuncInvSrcAlpha,
+        BlendFuncDestColor,
+        BlendFuncInvDestColor,
+        BlendFuncDestAlpha,
+        BlendFuncInvDestAlpha,
+        BlendFuncFactor,
         BlendFuncInvFactor,
     };
     enum StencilOp : uint8_t {
-        StencilOpKeep, StencilOpZero, StencilOpReplace, StencilOpInvert, StencilOpIncrWrap, StencilOpDecrWrap,
-        StencilOpIncrSat, StencilOpDecrSat,
+        StencilOpKeep,
+        StencilOpZero,
+        StencilOpReplace,
+        StencilOpInvert,
+        StencilOpIncrWrap,
+        StencilOpDecrWrap,
+        StencilOpIncrSat,
+        StencilOpDecrSat,
     };
     enum ColorMask : uint8_t {
-        ColorMaskNone = 0, ColorMaskR = 1, ColorMaskG = 2, ColorMaskB = 4, ColorMaskA = 8, ColorMaskAll = 15,
+        ColorMaskNone = 0,
+        ColorMaskR = 1,
+        ColorMaskG = 2,
+        ColorMaskB = 4,
+        ColorMaskA = 8,
+        ColorMaskAll = 15,
     };
 
     Pipeline() = default;
@@ -70,32 +108,37 @@ public:
     void setTexelMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
 
     /// Adds the next attribute: locations count up from 0 in the order of the calls. `buffer` is the slot of
-    /// Command::setVertexBuffer; `rate` 0 steps by vertex, 1 by instance. Errors: "pipeline.attribute".
+    /// Command::setVertexBuffer; `rate` 0 steps by vertex, 1 by instance. At most 16 attributes and buffers, strides of
+    /// 1 to 2048 bytes; offset and stride are multiples of a component's size. What the shader does not read is not
+    /// fetched. Errors: "pipeline.attribute".
     void addAttribute(Attribute attribute, Format format, uint32_t buffer, uint32_t offset, uint32_t stride,
                       uint32_t rate = 0, Where where = Where::current());
 
-    void setPrimitive(PrimitiveType primitive);
-    void setFillMode(FillModeType mode);
-    void setCullMode(CullModeType mode);
-    void setFrontMode(FrontModeType mode);
-    void setDepthFunc(DepthFunc func);
-    void setDepthMask(bool write);
-    void setDepthBias(float bias, float slope);
+    void setPrimitive(PrimitiveType primitive, Where where = Where::current());
+    void setFillMode(FillModeType mode, Where where = Where::current());
+    void setCullMode(CullModeType mode, Where where = Where::current());
+    void setFrontMode(FrontModeType mode, Where where = Where::current());
+    void setDepthFunc(DepthFunc func, Where where = Where::current());
+    void setDepthMask(bool write, Where where = Where::current());
+    void setDepthBias(float bias, float slope, Where where = Where::current());
     /// Fragments beyond the depth range are kept, their depth clamped; needs FeatureDepthClamp.
-    void setDepthClamp(bool enabled);
-    void setStencilFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass);
-    void setStencilMask(uint8_t read, uint8_t write);
+    void setDepthClamp(bool enabled, Where where = Where::current());
+    void setStencilFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass,
+                        Where where = Where::current());
+    void setStencilMask(uint8_t read, uint8_t write, Where where = Where::current());
     /// Blending of all colour targets, colour and alpha alike.
-    void setBlend(BlendOp op, BlendFunc source, BlendFunc destination);
-    void setBlendColor(uint32_t index, BlendOp op, BlendFunc source, BlendFunc destination);
-    void setBlendAlpha(uint32_t index, BlendOp op, BlendFunc source, BlendFunc destination);
-    void setColorMask(uint8_t mask, uint32_t index = 0);
+    void setBlend(BlendOp op, BlendFunc source, BlendFunc destination, Where where = Where::current());
+    void setBlendColor(uint32_t index, BlendOp op, BlendFunc source, BlendFunc destination,
+                       Where where = Where::current());
+    void setBlendAlpha(uint32_t index, BlendOp op, BlendFunc source, BlendFunc destination,
+                       Where where = Where::current());
+    void setColorMask(uint8_t mask, uint32_t index = 0, Where where = Where::current());
     /// Formats of the targets that the pipeline draws to; FormatUnknown removes one.
     void setColorFormat(Format format, uint32_t index = 0, Where where = Where::current());
     void setDepthFormat(Format format, Where where = Where::current());
     /// Samples a pixel: 1, 2, 4 or 8.
     void setMultisample(uint32_t samples, Where where = Where::current());
-    void setAlphaToCoverage(bool enabled);
+    void setAlphaToCoverage(bool enabled, Where where = Where::current());
 };
 
 }  // namespace glint

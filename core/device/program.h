@@ -24,35 +24,40 @@ public:
 
     /// Value of a specialisation constant by its constant_id or its name in the shader. Checked by create():
     /// "program.constant" if no stage has it.
-    void setConstant(uint32_t id, int32_t value);
-    void setConstant(uint32_t id, uint32_t value);
-    void setConstant(uint32_t id, float value);
-    void setConstant(uint32_t id, bool value);
-    void setConstant(std::string_view name, int32_t value);
-    void setConstant(std::string_view name, uint32_t value);
-    void setConstant(std::string_view name, float value);
-    void setConstant(std::string_view name, bool value);
+    void setConstant(uint32_t id, int32_t value, Where where = Where::current());
+    void setConstant(uint32_t id, uint32_t value, Where where = Where::current());
+    void setConstant(uint32_t id, float value, Where where = Where::current());
+    void setConstant(uint32_t id, bool value, Where where = Where::current());
+    void setConstant(std::string_view name, int32_t value, Where where = Where::current());
+    void setConstant(std::string_view name, uint32_t value, Where where = Where::current());
+    void setConstant(std::string_view name, float value, Where where = Where::current());
+    void setConstant(std::string_view name, bool value, Where where = Where::current());
 
-    /// Makes the native object. A second call fails with "program.created".
+    /// Makes the native object from the stages set; what is configured afterwards changes nothing and is told to the
+    /// message callback: "program.created", as for a second call. Errors: "program.*", "kernel.*", "pipeline.*",
+    /// "shader.*", see docs/errors.md.
     Status create(Where where = Where::current());
-    /// The same on one of the device's threads; the handle is Building until done. Recording with it waits.
+    /// The same on a thread of the process' pool; the handle is Building until done. Recording with it waits. When the
+    /// last handle goes before that, so does the work, or its end is waited for if it has begun.
     void createAsync(Where where = Where::current());
-    /// Waits for createAsync and returns its outcome.
-    Status wait() const;
+    /// Waits for createAsync and returns its outcome; from any thread but out of the message callback.
+    Status wait(Where where = Where::current()) const;
 
-    /// If a file of one of the shaders has changed, compiles it again and replaces the native object; recorders begun
-    /// afterwards use it. On failure the program keeps working as it was and the error says why.
-    /// True in `changed` if something was replaced.
+    /// If a file of one of the shaders has changed, compiles it again and replaces the native object, for lists
+    /// submitted afterwards. Not while another thread records with the program. On failure the program keeps working as
+    /// it was, the error says why, and the next attempt waits for the next change of a file. Constants and all other
+    /// state stay; other resources or push constants fail with "program.layout_changed". True in `changed` if something
+    /// was replaced.
     Status reload(bool* changed = nullptr, Where where = Where::current());
 
-    /// Slots of a kind that the shaders declare.
+    /// Slots of a kind that the shaders declare; 0 unless ready.
     uint32_t getSlots(SlotKind kind) const;
     /// What setUniform(i) and the other slots refer to. Empty unless ready.
     const BindingLayout& getLayout() const;
 
 protected:
     bool load(Shader shader, Where where);
-    void declareSlots(SlotKind kind, uint32_t count, ShaderMask mask, bool exact, Where where);
+    void declareSlots(SlotKind kind, uint32_t first, uint32_t count, ShaderMask mask, Where where);
 };
 
 }  // namespace glint

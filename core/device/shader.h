@@ -15,8 +15,20 @@ namespace glint {
 class Shader : public Handle {
 public:
     enum Type : uint8_t {
-        TypeVertex, TypeControl, TypeEvaluate, TypeGeometry, TypeFragment, TypeCompute, TypeTask, TypeMesh,
-        TypeRayGen, TypeRayMiss, TypeClosest, TypeFirstHit, TypeIntersection, TypeCallable,
+        TypeVertex,
+        TypeControl,
+        TypeEvaluate,
+        TypeGeometry,
+        TypeFragment,
+        TypeCompute,
+        TypeTask,
+        TypeMesh,
+        TypeRayGen,
+        TypeRayMiss,
+        TypeClosest,
+        TypeFirstHit,
+        TypeIntersection,
+        TypeCallable,
     };
     using Mask = ShaderMask;
     static constexpr Mask MaskVertex = stageBit(ShaderStage::Vertex);
@@ -47,6 +59,9 @@ public:
     const Reflection& getReflection() const;
     /// Optimised SPIR-V. Empty unless ready.
     std::span<const uint32_t> getWords() const;
+
+    /// The same shader compiled anew, from its file if it was loaded from one.
+    Shader reloaded(std::source_location where = std::source_location::current()) const;
 
     /// Global macros, for every shader compiled from now on.
     static void setMacro(std::string_view name, int value);

@@ -12,6 +12,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <source_location>
 #include <string>
 #include <utility>
 #include <vector>
@@ -73,6 +74,8 @@ public:
 
 protected:
     virtual ~Object();
+    /// Nothing refers to the object any more; it is still whole.
+    virtual void lastRelease() {}
 
 private:
     std::atomic<uint32_t> references_ = 1;
@@ -142,21 +145,73 @@ public:
 
     ShaderSource source;
     CompiledShader compiled;
+    FileStamp file;  ///< of the file it was loaded from, no path if there is none
 };
 
 /// What a Kernel and a Pipeline have in common.
 class ProgramObject : public Object {
 public:
+    using Where = std::source_location;
+
     ProgramObject(ObjectType type, DeviceObject* device) : Object(type, device) {}
 
+    /// A value for the specialisation constant with this name, or with this id if the name is empty.
+    struct Constant {
+        std::string name;
+        uint32_t id = 0;
+        SpecializationConstant::Type type = SpecializationConstant::Type::Uint;
+        uint32_t value = 0;
+    };
+    /// The compiled stages with the constants that each of them has.
+    struct Stages {
+        std::vector<Ref<ShaderObject>> shaders;
+        std::vector<std::vector<SpecializationValue>> constants;
+        const Reflection* find(ShaderStage stage) const;
+        StageDesc desc(size_t index) const;
+    };
+
+    Status create(Where where);
+    void createAsync(Where where);
+    /// Returns once no createAsync is under way, and does its work itself if no thread has begun it yet.
+    void waitCreated();
+    Status reload(bool& changed, Where where);
+    /// True if the program can still be configured. Keeps an error, or tells of one if it is ready already.
+    bool configurable(Where where);
+
+    /// An error about this program; the message begins with its label.
+    Error problem(Where where, ErrorCode code, const char* id, std::string_view message) const;
+    /// Features that the device was made without: "program.feature".
+    Error missing(Where where, FeatureMask features, std::string_view what) const;
+
     std::vector<Ref<ShaderObject>> shaders;
-    std::vector<std::pair<std::string, SpecializationValue>> constants;  ///< by name where it is not empty
+    std::vector<Constant> constants;
+    /// Slots of each kind that were declared, -1 if none were, and the stages that see them.
     std::array<int32_t, static_cast<size_t>(SlotKind::Count)> declared = {-1, -1, -1, -1, -1, -1, -1, -1};
+    std::array<std::vector<ShaderMask>, static_cast<size_t>(SlotKind::Count)> masks;
     BindingLayout layout;
     /// Where element 0 of BindingLayout::resources[i] stands in a binding block.
     std::vector<uint32_t> first_element;
     uint32_t element_count = 0;
     uint32_t uniform_elements = 0;
+
+protected:
+    /// Checks what is left to check and makes the native object from `stages` and `layout`. Changes the object's other
+    /// members only on success.
+    virtual Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) = 0;
+
+private:
+    struct Creation;
+
+    void lastRelease() override;
+    Status build(Where where);
+    Expected<BindingLayout> mergeStages(const Stages& stages, Where where) const;
+    Expected<Stages> specialize(std::vector<Ref<ShaderObject>> compiled, Where where) const;
+    Error checkFeatures(const Reflection& stage, Where where) const;
+    Error checkResource(const ShaderResource& resource, Where where) const;
+    Error checkSlots(const BindingLayout& merged, Where where) const;
+
+    std::shared_ptr<Creation> creation_;  ///< of createAsync
+    std::vector<FileStamp> stamps_;       ///< of the files behind `shaders` when they were last compiled, or tried to
 };
 
 class KernelObject final : public ProgramObject {
@@ -165,14 +220,26 @@ public:
     NativeKernel* nativeKernel() const { return static_cast<NativeKernel*>(native.get()); }
 
     std::array<uint32_t, 3> group_size = {1, 1, 1};
+
+private:
+    Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) override;
 };
 
 class PipelineObject final : public ProgramObject {
 public:
-    explicit PipelineObject(DeviceObject* device) : ProgramObject(ObjectType::Pipeline, device) {}
+    explicit PipelineObject(DeviceObject* device) : ProgramObject(ObjectType::Pipeline, device) {
+        desc.depth_write = true;  // once there is a depth test
+    }
     NativePipeline* nativePipeline() const { return static_cast<NativePipeline*>(native.get()); }
 
-    PipelineDesc desc;  ///< stages and layout are filled by create()
+    PipelineDesc desc;  ///< blends and layout are completed by create(); stages stay empty
+
+private:
+    Error checkStages(const Stages& stages, Where where) const;
+    Error checkAttributes(const Reflection& vertex, Where where) const;
+    Error checkTargets(const PipelineDesc& complete, const Reflection* fragment, Where where) const;
+    Error checkState(const PipelineDesc& complete, Where where) const;
+    Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) override;
 };
 
 class QueryObject final : public Object {

@@ -1,0 +1,50 @@
+#pragma once
+
+// Answers in float64, to test float32 code against.
+
+#include <glint/format/mesh.h>
+#include <glint/math/math.h>
+
+#include <cstdint>
+#include <random>
+
+namespace glint::test {
+
+/// Number of float32 values from `a` to `b`: 0 if equal (also 0 and -0), 2^32 - 1 if one of them is NaN.
+uint32_t ulpDistance(float a, float b);
+
+/// Where a ray meets a mesh first.
+struct ReferenceHit {
+    bool hit = false;
+    double t = 0.0;          ///< in units of the direction's length
+    uint32_t triangle = 0;   ///< the lowest of those with the same t
+    Vector2d barycentrics;   ///< of the second and the third corner
+};
+
+/// Closest hit with t_min <= t <= t_max by trying every triangle, from both sides, in float64. Edges belong to both
+/// triangles, with the width of float64's rounding (about 1e-15 of the distance), so that nothing leaks; triangles of zero
+/// area and rays in a triangle's plane do not meet.
+ReferenceHit closestHit(const Mesh& mesh, const Vector3d& origin, const Vector3d& direction, double t_min = 0.0,
+                        double t_max = 1e300);
+
+/// A generator of random numbers whose values are the same with every standard library.
+class Random {
+public:
+    explicit Random(uint64_t seed) : engine_(seed) {}
+
+    /// In [0, 2^64).
+    uint64_t bits() { return engine_(); }
+    /// In [0, count); count is positive.
+    uint64_t below(uint64_t count) { return engine_() % count; }
+    /// In [low, high).
+    double uniform(double low = 0.0, double high = 1.0) {
+        return low + (high - low) * static_cast<double>(engine_() >> 11) * 0x1p-53;
+    }
+    /// Uniform on the unit sphere.
+    Vector3d direction();
+
+private:
+    std::mt19937_64 engine_;
+};
+
+}  // namespace glint::test

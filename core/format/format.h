@@ -7,6 +7,7 @@ namespace glint {
 
 /// Formats of texels, vertex attributes and indices. Letters: channels, type (u unsigned, i signed, f float), bits of
 /// one channel, n normalised, s sRGB.
+// clang-format off
 enum Format : uint8_t {
     FormatUnknown,
     FormatRu8n, FormatRi8n, FormatRu8, FormatRi8, FormatRu16n, FormatRi16n, FormatRu16, FormatRi16, FormatRf16,
@@ -23,16 +24,17 @@ enum Format : uint8_t {
     FormatBC6HRGBf16, FormatBC7RGBAu8n, FormatBC7RGBAu8ns,
     FormatCount,
 };
+// clang-format on
 
 /// What a shader sees in a texel of a format.
 enum class FormatType : uint8_t { None, Float, Int, Uint, Depth };
 
 struct FormatInfo {
-    const char* name = "";       ///< "RGBAu8n"
+    const char* name = "";  ///< "RGBAu8n"
     FormatType type = FormatType::None;
     uint8_t components = 0;
-    uint8_t block_size = 0;      ///< bytes of one texel, or of one block of a compressed format
-    uint8_t block_width = 1;     ///< texels along each side of a block
+    uint8_t block_size = 0;   ///< bytes of one texel, or of one block of a compressed format
+    uint8_t block_width = 1;  ///< texels along each side of a block
     bool srgb = false;
     bool depth = false;
     bool stencil = false;

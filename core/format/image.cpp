@@ -97,8 +97,8 @@ std::string extension(const std::filesystem::path& path) {
 }
 
 Error unknownExtension(const std::filesystem::path& path) {
-    return makeError(ErrorCode::Unsupported, "image.unknown_extension",
-                     "'{}': images end in .png, not in '{}'", path.string(), path.extension().string());
+    return makeError(ErrorCode::Unsupported, "image.unknown_extension", "'{}': images end in .png, not in '{}'",
+                     path.string(), path.extension().string());
 }
 
 }  // namespace
@@ -109,14 +109,14 @@ Expected<Image> Image::create(Format format, uint32_t width, uint32_t height, ui
         return unexpected(makeError(ErrorCode::InvalidArgument, "image.format",
                                     "an image cannot have the format {}: its texels must stand alone", info.name));
     if (width == 0 || height == 0)
-        return unexpected(makeError(ErrorCode::InvalidArgument, "image.size_zero",
-                                    "an image of {}x{} texels has none", width, height));
+        return unexpected(makeError(ErrorCode::InvalidArgument, "image.size_zero", "an image of {}x{} texels has none",
+                                    width, height));
     // At most 2^32 * 2^32 texels, so divide rather than multiply by their size.
     const uint64_t texels = static_cast<uint64_t>(width) * height;
     if (texels > limit / info.block_size)
         return unexpected(makeError(ErrorCode::OutOfRange, "image.too_large",
-                                    "{}x{} texels of {} take more than the limit of {} bytes", width, height,
-                                    info.name, limit));
+                                    "{}x{} texels of {} take more than the limit of {} bytes", width, height, info.name,
+                                    limit));
     Image image;
     image.format_ = format;
     image.width_ = width;
@@ -168,8 +168,7 @@ Vector4f Image::load(uint32_t x, uint32_t y) const {
     const ChannelType type = channelType(format_);
     if (type == ChannelType::None || x >= width_ || y >= height_) return value;
     const std::byte* bytes = texel(x, y).data();
-    for (uint32_t i = 0; i < formatInfo(format_).components; i++)
-        value[static_cast<int>(i)] = decode(type, bytes, i);
+    for (uint32_t i = 0; i < formatInfo(format_).components; i++) value[static_cast<int>(i)] = decode(type, bytes, i);
     if (isBgra(format_)) std::swap(value.x, value.z);
     return value;
 }
@@ -179,8 +178,7 @@ void Image::store(uint32_t x, uint32_t y, const Vector4f& value) {
     if (type == ChannelType::None || x >= width_ || y >= height_) return;
     const Vector4f ordered = isBgra(format_) ? Vector4f(value.z, value.y, value.x, value.w) : value;
     std::byte* bytes = texel(x, y).data();
-    for (uint32_t i = 0; i < formatInfo(format_).components; i++)
-        encode(type, bytes, i, ordered[static_cast<int>(i)]);
+    for (uint32_t i = 0; i < formatInfo(format_).components; i++) encode(type, bytes, i, ordered[static_cast<int>(i)]);
 }
 
 Expected<Image> Image::convert(Format format) const {

@@ -12,8 +12,8 @@
 
 namespace glint {
 
-/// A picture in host memory: rows of texels from top to bottom, left to right, without padding. A value: copies copy the
-/// texels. Formats whose texels stand alone (all but the block-compressed ones).
+/// A picture in host memory: rows of texels from top to bottom, left to right, without padding. A value: copies copy
+/// the texels. Formats whose texels stand alone (all but the block-compressed ones).
 class Image {
 public:
     /// Largest number of bytes that an image read from a file may take, unless the caller says otherwise.
@@ -29,8 +29,8 @@ public:
     /// An image of the given texels. Errors: those above and "image.data_size" (not width * height texels).
     static Expected<Image> create(Format format, uint32_t width, uint32_t height, std::span<const std::byte> data);
 
-    /// Reads a file; its ending says which format it has (".png"). `limit` bounds the bytes of the file and of the image.
-    /// Errors: those of readFile, "image.unknown_extension", "image.png_malformed", "image.too_large".
+    /// Reads a file; its ending says which format it has (".png"). `limit` bounds the bytes of the file and of the
+    /// image. Errors: those of readFile, "image.unknown_extension", "image.png_malformed", "image.too_large".
     static Expected<Image> load(const std::filesystem::path& path, uint64_t limit = default_limit);
 
     /// Writes a file, as its ending says (".png"). Errors: those of writeFile, "image.unknown_extension",
@@ -51,10 +51,10 @@ public:
     std::span<std::byte> texel(uint32_t x, uint32_t y);
     std::span<const std::byte> texel(uint32_t x, uint32_t y) const;
 
-    /// A texel as a shader's `texelFetch` returns it, but for sRGB formats, whose stored values are not decoded: channels
-    /// in the order R, G, B, A, normalised ones in [0, 1] or [-1, 1], absent ones 0, absent alpha 1. For formats with
-    /// channels of 8 normalised, 16 normalised, float16 or float32 bits; all others, and places outside of the image,
-    /// give (0, 0, 0, 1).
+    /// A texel as a shader's `texelFetch` returns it, but for sRGB formats, whose stored values are not decoded:
+    /// channels in the order R, G, B, A, normalised ones in [0, 1] or [-1, 1], absent ones 0, absent alpha 1. For
+    /// formats with channels of 8 normalised, 16 normalised, float16 or float32 bits; all others, and places outside of
+    /// the image, give (0, 0, 0, 1).
     Vector4f load(uint32_t x, uint32_t y) const;
 
     /// The inverse, for the same formats: normalised values are clamped and rounded to nearest, NaN becomes 0. Other
@@ -79,9 +79,9 @@ private:
 /// Errors: "image.png_malformed", "image.too_large".
 Expected<Image> decodePng(std::span<const std::byte> bytes, uint64_t limit = Image::default_limit);
 
-/// Makes a PNG file's bytes. For FormatRu8n, RGu8n, RGBAu8n, RGBAu8ns, BGRAu8n, BGRAu8ns, Ru16n, RGu16n and RGBAu16n; the
-/// sRGB ones are marked so. An image whose alpha is 1 everywhere is written without alpha.
-/// Errors: "image.png_format", "image.size_zero" (an empty image), "image.too_large" (a side of 2^31 or more).
+/// Makes a PNG file's bytes. For FormatRu8n, RGu8n, RGBAu8n, RGBAu8ns, BGRAu8n, BGRAu8ns, Ru16n, RGu16n and RGBAu16n;
+/// the sRGB ones are marked so. An image whose alpha is 1 everywhere is written without alpha. Errors:
+/// "image.png_format", "image.size_zero" (an empty image), "image.too_large" (a side of 2^31 or more).
 Expected<std::vector<std::byte>> encodePng(const Image& image);
 
 }  // namespace glint

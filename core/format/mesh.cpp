@@ -27,14 +27,14 @@ Status Mesh::validate() const {
                          indices.size());
     for (size_t i = 0; i < indices.size(); i++)
         if (indices[i] >= positions.size())
-            return makeError(ErrorCode::OutOfRange, "mesh.index_range",
-                             "triangle {} names vertex {} of {}", i / 3, indices[i], positions.size());
+            return makeError(ErrorCode::OutOfRange, "mesh.index_range", "triangle {} names vertex {} of {}", i / 3,
+                             indices[i], positions.size());
     if (!normals.empty() && normals.size() != positions.size())
         return makeError(ErrorCode::InvalidArgument, "mesh.attribute_count", "{} normals for {} positions",
                          normals.size(), positions.size());
     if (!texcoords.empty() && texcoords.size() != positions.size())
-        return makeError(ErrorCode::InvalidArgument, "mesh.attribute_count",
-                         "{} texture coordinates for {} positions", texcoords.size(), positions.size());
+        return makeError(ErrorCode::InvalidArgument, "mesh.attribute_count", "{} texture coordinates for {} positions",
+                         texcoords.size(), positions.size());
     for (size_t i = 0; i < positions.size(); i++)
         if (!isFinite(positions[i]))
             return makeError(ErrorCode::InvalidArgument, "mesh.not_finite", "position {} is ({}, {}, {})", i,

@@ -49,8 +49,8 @@ struct Mesh {
     /// The box of all positions, also of those that no triangle uses.
     BoundBox bounds() const { return BoundBox(positions); }
 
-    /// Replaces the normals: at each vertex the mean of its triangles' normals, weighted by their areas, of unit length.
-    /// (0, 0, 1) where no triangle of nonzero area meets the vertex. Indices have to be in range.
+    /// Replaces the normals: at each vertex the mean of its triangles' normals, weighted by their areas, of unit
+    /// length. (0, 0, 1) where no triangle of nonzero area meets the vertex. Indices have to be in range.
     void createNormals();
 
     bool operator==(const Mesh&) const = default;
@@ -66,16 +66,16 @@ struct Mesh {
 ///   the warning "mesh.attribute_dropped". Normals are brought to unit length; one of length zero becomes (0, 0, 1).
 /// - Numbers are rounded correctly to float32.
 ///
-/// `name` names the file in errors; every error has the line. The mesh may take `limit` bytes; beside it the reader takes
-/// at most 64 bytes for each byte of text.
-/// Errors: "mesh.empty_file", "mesh.no_faces", "mesh.syntax" (a number is missing or malformed), "mesh.index_range" (an
-/// index is 0 or names nothing that stands above it), "mesh.not_finite", "mesh.face_corners" (fewer than 3 or more than
-/// 1024), "mesh.too_large".
+/// `name` names the file in errors; every error has the line. The mesh may take `limit` bytes; beside it the reader
+/// takes at most 64 bytes for each byte of text. Errors: "mesh.empty_file", "mesh.no_faces", "mesh.syntax" (a number is
+/// missing or malformed), "mesh.index_range" (an index is 0 or names nothing that stands above it), "mesh.not_finite",
+/// "mesh.face_corners" (fewer than 3 or more than 1024), "mesh.too_large".
 Expected<Mesh> parseObj(std::string_view text, const std::string& name, uint64_t limit = Mesh::default_limit);
 
 /// Splits a polygon, given by its corners in order, into n - 2 triangles: three numbers of corners for each, turning as
-/// the polygon does. Right for flat polygons that do not cross themselves, convex or not; others give some triangulation.
-/// Time grows with the square of the corners, for hostile ones with the cube. Empty for fewer than three corners.
+/// the polygon does. Right for flat polygons that do not cross themselves, convex or not; others give some
+/// triangulation. Time grows with the square of the corners, for hostile ones with the cube. Empty for fewer than three
+/// corners.
 std::vector<uint32_t> triangulatePolygon(std::span<const Vector3f> corners);
 
 }  // namespace glint

@@ -9,8 +9,8 @@
 #include <charconv>
 #include <unordered_map>
 
-// Read here and not by tinyobjloader, because of what 2.0.0rc10 does with defective files: a malformed number becomes 0, a
-// quad with an index out of range disappears, errors have no line; and its decimals are not correctly rounded.
+// Read here and not by tinyobjloader, because of what 2.0.0rc10 does with defective files: a malformed number becomes
+// 0, a quad with an index out of range disappears, errors have no line; and its decimals are not correctly rounded.
 
 namespace glint {
 
@@ -83,8 +83,7 @@ public:
         }
         line_ = 0;
         endPart();
-        if (mesh_.indices.empty())
-            return unexpected(error(ErrorCode::Io, "mesh.no_faces", "the file has no faces"));
+        if (mesh_.indices.empty()) return unexpected(error(ErrorCode::Io, "mesh.no_faces", "the file has no faces"));
         dropPartialAttributes();
         return std::move(mesh_);
     }
@@ -173,8 +172,8 @@ private:
         }
         if (corners_.size() < 3 || corners_.size() > max_corners)
             return error(ErrorCode::Io, "mesh.face_corners", "face {} has {}{} corners, 3 to {} are allowed", face_ + 1,
-                         corners_.size() > max_corners ? "more than " : "",
-                         std::min(corners_.size(), max_corners), max_corners);
+                         corners_.size() > max_corners ? "more than " : "", std::min(corners_.size(), max_corners),
+                         max_corners);
         face_++;
 
         polygon_.clear();

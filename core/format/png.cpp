@@ -10,8 +10,8 @@
 #include <cstdio>
 #include <cstring>
 
-// libpng reports errors by longjmp. Each function here that calls setjmp keeps nothing with a destructor in its frame, and
-// changes no local variable of it after the setjmp: all state lives in the object it is handed.
+// libpng reports errors by longjmp. Each function here that calls setjmp keeps nothing with a destructor in its frame,
+// and changes no local variable of it after the setjmp: all state lives in the object it is handed.
 
 namespace glint {
 
@@ -31,8 +31,10 @@ struct Session {
     Session(const Session&) = delete;
     Session& operator=(const Session&) = delete;
     ~Session() {
-        if (writing) png_destroy_write_struct(&png, &info);
-        else png_destroy_read_struct(&png, &info, nullptr);
+        if (writing)
+            png_destroy_write_struct(&png, &info);
+        else
+            png_destroy_read_struct(&png, &info, nullptr);
     }
 };
 
@@ -80,9 +82,12 @@ bool readHeader(Session& session, Header& header) {
     const int color = png_get_color_type(session.png, session.info);
     const bool has_alpha =
         (color & PNG_COLOR_MASK_ALPHA) != 0 || png_get_valid(session.png, session.info, PNG_INFO_tRNS) != 0;
-    if ((color & PNG_COLOR_MASK_COLOR) != 0) header.format = is_deep ? FormatRGBAu16n : FormatRGBAu8n;
-    else if (has_alpha) header.format = is_deep ? FormatRGu16n : FormatRGu8n;
-    else header.format = is_deep ? FormatRu16n : FormatRu8n;
+    if ((color & PNG_COLOR_MASK_COLOR) != 0)
+        header.format = is_deep ? FormatRGBAu16n : FormatRGBAu8n;
+    else if (has_alpha)
+        header.format = is_deep ? FormatRGu16n : FormatRGu8n;
+    else
+        header.format = is_deep ? FormatRu16n : FormatRu8n;
 
     png_set_expand(session.png);
     if ((color & PNG_COLOR_MASK_COLOR) != 0 && !has_alpha) png_set_add_alpha(session.png, 0xffff, PNG_FILLER_AFTER);
@@ -175,8 +180,8 @@ Expected<Image> decodePng(std::span<const std::byte> bytes, uint64_t limit) {
 
     Header header;
     if (!readHeader(session, header)) return malformed(session.message);
-    // DEFLATE packs at most 1032 to 1, and eight texels are a byte or more: a larger image cannot be in there. Saying so
-    // before anything is allocated keeps a file of 100 bytes from claiming all of `limit`.
+    // DEFLATE packs at most 1032 to 1, and eight texels are a byte or more: a larger image cannot be in there. Saying
+    // so before anything is allocated keeps a file of 100 bytes from claiming all of `limit`.
     const uint64_t texels = static_cast<uint64_t>(header.width) * header.height;
     if (texels / 8 > static_cast<uint64_t>(bytes.size()) * 1032) return malformed("the file ends too early");
     Expected<Image> image = Image::create(header.format, header.width, header.height, limit);

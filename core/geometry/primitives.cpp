@@ -11,9 +11,7 @@ namespace {
 
 constexpr double two_pi = 6.283185307179586476925;
 
-void addTriangle(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c) {
-    mesh.indices.insert(mesh.indices.end(), {a, b, c});
-}
+void addTriangle(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c) { mesh.indices.insert(mesh.indices.end(), {a, b, c}); }
 
 /// Two triangles of the corners a, b, c, d in counter-clockwise order.
 void addQuad(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
@@ -55,12 +53,12 @@ Mesh createTorus(float ring, float tube, uint32_t ring_segments, uint32_t tube_s
 Mesh createSphere(float radius, uint32_t subdivisions) {
     // Corners of three golden rectangles.
     const double g = (1.0 + std::sqrt(5.0)) / 2.0;
-    std::vector<Vector3d> points = {{-1, g, 0}, {1, g, 0}, {-1, -g, 0}, {1, -g, 0}, {0, -1, g}, {0, 1, g},
-                                    {0, -1, -g}, {0, 1, -g}, {g, 0, -1}, {g, 0, 1}, {-g, 0, -1}, {-g, 0, 1}};
+    std::vector<Vector3d> points = {{-1, g, 0},  {1, g, 0},  {-1, -g, 0}, {1, -g, 0}, {0, -1, g},  {0, 1, g},
+                                    {0, -1, -g}, {0, 1, -g}, {g, 0, -1},  {g, 0, 1},  {-g, 0, -1}, {-g, 0, 1}};
     for (Vector3d& point : points) point = glm::normalize(point);
-    std::vector<Vector3u> faces = {{0, 11, 5}, {0, 5, 1},  {0, 1, 7},   {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
-                                   {11, 10, 2}, {10, 7, 6}, {7, 1, 8},   {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
-                                   {3, 8, 9},  {4, 9, 5},  {2, 4, 11},  {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
+    std::vector<Vector3u> faces = {{0, 11, 5},  {0, 5, 1},  {0, 1, 7},  {0, 7, 10}, {0, 10, 11}, {1, 5, 9}, {5, 11, 4},
+                                   {11, 10, 2}, {10, 7, 6}, {7, 1, 8},  {3, 9, 4},  {3, 4, 2},   {3, 2, 6}, {3, 6, 8},
+                                   {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}};
 
     for (uint32_t step = 0; step < std::min(subdivisions, 10u); step++) {
         std::unordered_map<uint64_t, uint32_t> middles;

@@ -9,7 +9,8 @@ namespace glint {
 // that meet have bit-equal corners. The order of triangles is that of the loops, so the same on every machine.
 
 /// A torus around the Z axis: `ring` is the radius of the circle that the tube follows, `tube` that of the tube.
-/// ring_segments * tube_segments vertices, twice as many triangles, row by row around the ring. Segments are at least 3.
+/// ring_segments * tube_segments vertices, twice as many triangles, row by row around the ring. Segments are at
+/// least 3.
 Mesh createTorus(float ring, float tube, uint32_t ring_segments, uint32_t tube_segments);
 
 /// An icosahedron whose faces have been split in four `subdivisions` times, with vertices on the sphere:
@@ -20,8 +21,8 @@ Mesh createSphere(float radius, uint32_t subdivisions);
 /// texture coordinates. Closed by position, not by index.
 Mesh createBox(const Vector3f& size);
 
-/// A square in the XY plane facing +Z with sides of length `size`, of segments * segments cells with two triangles each,
-/// with normals and with texture coordinates from (0, 0) at -X -Y to (1, 1). Segments are at least 1.
+/// A square in the XY plane facing +Z with sides of length `size`, of segments * segments cells with two triangles
+/// each, with normals and with texture coordinates from (0, 0) at -X -Y to (1, 1). Segments are at least 1.
 Mesh createPlane(float size, uint32_t segments = 1);
 
 }  // namespace glint

@@ -16,7 +16,8 @@ struct BoundBox {
     BoundBox(const Vector3f& min_, const Vector3f& max_) : min(min_), max(max_) {}
     explicit BoundBox(std::span<const Vector3f> points);
 
-    /// Grows the box to hold the point. Returns false, and leaves the box as it was, if a coordinate is NaN or infinite.
+    /// Grows the box to hold the point. Returns false, and leaves the box as it was, if a coordinate is NaN or
+    /// infinite.
     bool add(const Vector3f& point);
     void add(const BoundBox& box);
 

@@ -36,8 +36,9 @@ public:
     /// Looks from `from` at `to`. Where `up` is parallel to that direction another one is chosen; where the two points
     /// coincide the camera looks along +Y.
     Camera& lookAt(const Vector3f& from, const Vector3f& to, const Vector3f& up = {0, 0, 1});
-    /// `fov`: angle from the bottom to the top of the picture in degrees, in (0, 180). `aspect`: width / height, positive.
-    /// `near`: distance of the near plane, positive. Values outside are clamped to [0.01, 179], [1e-4, 1e4], [1e-6, inf).
+    /// `fov`: angle from the bottom to the top of the picture in degrees, in (0, 180). `aspect`: width / height,
+    /// positive. `near`: distance of the near plane, positive. Values outside are clamped to [0.01, 179], [1e-4, 1e4],
+    /// [1e-6, inf).
     Camera& perspective(float fov, float aspect, float near = 0.1f);
 
     const Vector3f& position() const { return position_; }

@@ -42,15 +42,13 @@ Matrix4x4f scale(const Vector3f& factors) {
 
 Transform3x4::Transform3x4(const Matrix4x4f& matrix) {
     for (int row = 0; row < 3; row++)
-        for (int column = 0; column < 4; column++)
-            rows[static_cast<size_t>(row * 4 + column)] = matrix[column][row];
+        for (int column = 0; column < 4; column++) rows[static_cast<size_t>(row * 4 + column)] = matrix[column][row];
 }
 
 Matrix4x4f Transform3x4::matrix() const {
     Matrix4x4f matrix(1.0f);
     for (int row = 0; row < 3; row++)
-        for (int column = 0; column < 4; column++)
-            matrix[column][row] = rows[static_cast<size_t>(row * 4 + column)];
+        for (int column = 0; column < 4; column++) matrix[column][row] = rows[static_cast<size_t>(row * 4 + column)];
     return matrix;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
-// GLM under the names that the tutorials use. No GLM_FORCE_ macro is set here: GLM's functions are inline, and a program
-// that includes GLM with other settings of its own would get either definition. What depends on a depth range or a
-// handedness (projections) is Glint's own: see <glint/math/camera.h>.
+// GLM under the names that the tutorials use. No GLM_FORCE_ macro is set here: GLM's functions are inline, and a
+// program that includes GLM with other settings of its own would get either definition. What depends on a depth range
+// or a handedness (projections) is Glint's own: see <glint/math/camera.h>.
 
 #include <glm/mat3x3.hpp>
 #include <glm/mat4x4.hpp>

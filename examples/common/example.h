@@ -25,15 +25,15 @@
 
 /// Arguments that every example takes.
 struct ExampleOptions {
-    uint32_t width = 1600;           ///< --size WxH, texels: each from 1 to 16384
+    uint32_t width = 1600;  ///< --size WxH, texels: each from 1 to 16384
     uint32_t height = 900;
-    uint32_t frames = 1;             ///< --frames N: how many to draw; 1 or more
-    std::optional<double> time;      ///< --time SECONDS: every frame shows this moment; not negative
-    std::filesystem::path image;     ///< --image FILE: where to write the last frame; empty: nowhere
-    std::filesystem::path stats;     ///< --stats FILE.json: where to write the statistics; empty: nowhere
-    std::string adapter;             ///< --adapter N|NAME: index or part of a name; empty: the best
-    std::string api;                 ///< --api NAME; empty: the default
-    std::string tracing = "auto";    ///< --tracing auto|driver|software
+    uint32_t frames = 1;           ///< --frames N: how many to draw; 1 or more
+    std::optional<double> time;    ///< --time SECONDS: every frame shows this moment; not negative
+    std::filesystem::path image;   ///< --image FILE: where to write the last frame; empty: nowhere
+    std::filesystem::path stats;   ///< --stats FILE.json: where to write the statistics; empty: nowhere
+    std::string adapter;           ///< --adapter N|NAME: index or part of a name; empty: the best
+    std::string api;               ///< --api NAME; empty: the default
+    std::string tracing = "auto";  ///< --tracing auto|driver|software
 };
 
 class Example {

@@ -46,7 +46,8 @@ std::string Statistics::text() const {
     addText("tracing", tracing);
     if (!features.empty()) json["features"] = features;
     if (!counts.empty()) json["counts"] = counts;
-    if (rays_ && median(ray_pass_) > 0.0) json["rays_per_second"] = static_cast<double>(rays_) * 1e9 / median(ray_pass_);
+    if (rays_ && median(ray_pass_) > 0.0)
+        json["rays_per_second"] = static_cast<double>(rays_) * 1e9 / median(ray_pass_);
     if (!passes_.empty()) {
         auto& passes = json["passes"] = nlohmann::ordered_json::array();
         for (const Pass& pass : passes_)

@@ -20,7 +20,8 @@ private:
     std::filesystem::path path_;
 };
 
-/// Where tests leave what a person may want to look at: out/test in the source tree, or $GLINT_TEST_OUTPUT. Made if absent.
+/// Where tests leave what a person may want to look at: out/test in the source tree, or $GLINT_TEST_OUTPUT. Made if
+/// absent.
 std::filesystem::path outputDir();
 
 /// tests/ in the source tree.

@@ -79,9 +79,10 @@ testing::AssertionResult imagesMatch(const Image& actual, const Image& expected,
     savePicture(difference.heat_map, name + ".heat");
     const std::filesystem::path path = savePicture(actual, name + ".actual");
     return testing::AssertionFailure() << name << ": " << difference.differing << " texels differ by more than "
-                                       << tolerance.channel << ", " << tolerance.texels << " may; the largest difference is "
-                                       << difference.largest << ", the root mean square "
-                                       << std::sqrt(difference.mean_square) << "; see " << path.string();
+                                       << tolerance.channel << ", " << tolerance.texels
+                                       << " may; the largest difference is " << difference.largest
+                                       << ", the root mean square " << std::sqrt(difference.mean_square) << "; see "
+                                       << path.string();
 }
 
 testing::AssertionResult matchesGolden(const Image& actual, const std::string& name, const ImageTolerance& tolerance) {

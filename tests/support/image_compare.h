@@ -18,11 +18,11 @@ struct ImageTolerance {
 
 /// What compareImages finds. NaN differs from everything.
 struct ImageDifference {
-    bool is_comparable = false;    ///< same size, and formats that Image::load can read
-    uint64_t differing = 0;        ///< texels with a channel that differs by more than the threshold
-    float largest = 0.0f;          ///< largest difference of a channel
-    double mean_square = 0.0;      ///< mean over all texels and channels of the squared difference
-    Image heat_map;                ///< black where equal, blue to the threshold, then red to white at 16 times as much
+    bool is_comparable = false;  ///< same size, and formats that Image::load can read
+    uint64_t differing = 0;      ///< texels with a channel that differs by more than the threshold
+    float largest = 0.0f;        ///< largest difference of a channel
+    double mean_square = 0.0;    ///< mean over all texels and channels of the squared difference
+    Image heat_map;              ///< black where equal, blue to the threshold, then red to white at 16 times as much
 };
 
 ImageDifference compareImages(const Image& actual, const Image& expected, float threshold);

@@ -25,8 +25,10 @@ Error errorOf(const T& value) {
 
 MATCHER_P(HasErrorId, expected_id, std::string(negation ? "has no" : "has an") + " error '" + expected_id + "'") {
     const Error error = errorOf(arg);
-    if (error) *result_listener << "the error is: " << error.text();
-    else *result_listener << "there is no error";
+    if (error)
+        *result_listener << "the error is: " << error.text();
+    else
+        *result_listener << "there is no error";
     return error.id() == expected_id;
 }
 

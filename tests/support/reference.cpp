@@ -19,8 +19,8 @@ uint32_t ulpDistance(float a, float b) {
 
 namespace {
 
-/// Signed volume of the ray and an edge; all three are of one sign inside a triangle. 0 where rounding could have chosen
-/// the sign, else rays through a vertex could miss every triangle around it.
+/// Signed volume of the ray and an edge; all three are of one sign inside a triangle. 0 where rounding could have
+/// chosen the sign, else rays through a vertex could miss every triangle around it.
 double edgeVolume(const Vector3d& direction, const Vector3d& a, const Vector3d& b) {
     const double volume = glm::dot(direction, glm::cross(a, b));
     const double rounding = 1e-15 * glm::length(direction) * glm::length(a) * glm::length(b);

@@ -56,10 +56,11 @@ TEST(Example, EveryArgument) {
     example.add("--scale", scale, "how large");
     example.add("--quick", quick, "less work");
     example.add("--kind", kind, "which");
-    ASSERT_TRUE(parse(example, {"--size", "640x480", "--frames", "10", "--time", "2.5", "--image", "a.png", "--stats",
-                                "b.json", "--adapter", "llvm", "--api", "vulkan", "--tracing", "software", "--mesh",
-                                "m.obj", "--count", "7", "--quick", "--scale=0.5"})
-                    .parsed);
+    ASSERT_TRUE(
+        parse(example, {"--size",  "640x480", "--frames",  "10",   "--time",  "2.5",        "--image",   "a.png",
+                        "--stats", "b.json",  "--adapter", "llvm", "--api",   "vulkan",     "--tracing", "software",
+                        "--mesh",  "m.obj",   "--count",   "7",    "--quick", "--scale=0.5"})
+            .parsed);
     EXPECT_EQ(example.width(), 640u);
     EXPECT_EQ(example.height(), 480u);
     EXPECT_NEAR(example.aspect(), 4.0f / 3.0f, 1e-6f);
@@ -79,11 +80,26 @@ TEST(Example, EveryArgument) {
 }
 
 TEST(Example, WrongArgumentsEndWithTwo) {
-    const std::vector<std::vector<const char*>> cases = {
-        {"--size"}, {"--size", "640"}, {"--size", "0x5"}, {"--size", "5x0"}, {"--size", "640x480x3"},
-        {"--size", "16385x1"}, {"--size", "-1x5"}, {"--size", "99999999999x1"}, {"--frames", "0"}, {"--frames", "-1"},
-        {"--frames", "many"}, {"--time", "-1"}, {"--time", "nan"}, {"--time", "inf"}, {"--time", "soon"},
-        {"--tracing", "magic"}, {"--window"}, {"--unknown"}, {"stray"}, {"--image"}};
+    const std::vector<std::vector<const char*>> cases = {{"--size"},
+                                                         {"--size", "640"},
+                                                         {"--size", "0x5"},
+                                                         {"--size", "5x0"},
+                                                         {"--size", "640x480x3"},
+                                                         {"--size", "16385x1"},
+                                                         {"--size", "-1x5"},
+                                                         {"--size", "99999999999x1"},
+                                                         {"--frames", "0"},
+                                                         {"--frames", "-1"},
+                                                         {"--frames", "many"},
+                                                         {"--time", "-1"},
+                                                         {"--time", "nan"},
+                                                         {"--time", "inf"},
+                                                         {"--time", "soon"},
+                                                         {"--tracing", "magic"},
+                                                         {"--window"},
+                                                         {"--unknown"},
+                                                         {"stray"},
+                                                         {"--image"}};
     for (const auto& arguments : cases) {
         Example example("05_tracing", "Rays.");
         const Outcome run = parse(example, arguments);

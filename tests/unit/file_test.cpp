@@ -50,9 +50,7 @@ TEST(File, LimitIsInclusive) {
     EXPECT_THAT(readTextFile(dir / "a", 4), HasErrorId("file.too_large"));
 }
 
-TEST(File, DeviceWithoutSizeIsAnError) {
-    EXPECT_THAT(readFile("/dev/zero", 1000), HasErrorId("file.read"));
-}
+TEST(File, DeviceWithoutSizeIsAnError) { EXPECT_THAT(readFile("/dev/zero", 1000), HasErrorId("file.read")); }
 
 TEST(File, MissingFolderIsAnError) {
     const TempDir dir;

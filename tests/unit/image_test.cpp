@@ -16,8 +16,8 @@ using namespace glint::test;
 
 namespace {
 
-constexpr Format png_formats[] = {FormatRu8n,     FormatRGu8n,    FormatRGBAu8n, FormatRGBAu8ns, FormatBGRAu8n,
-                                  FormatBGRAu8ns, FormatRu16n,    FormatRGu16n,  FormatRGBAu16n};
+constexpr Format png_formats[] = {FormatRu8n,     FormatRGu8n, FormatRGBAu8n, FormatRGBAu8ns, FormatBGRAu8n,
+                                  FormatBGRAu8ns, FormatRu16n, FormatRGu16n,  FormatRGBAu16n};
 
 Image randomImage(Format format, uint32_t width, uint32_t height, uint64_t seed = 1) {
     Image image = Image::create(format, width, height).value();
@@ -143,9 +143,9 @@ TEST(Image, TexelsLieRowByRow) {
 }
 
 TEST(Image, LoadIsTheInverseOfStore) {
-    for (const Format format : {FormatRu8n, FormatRi8n, FormatRGu8n, FormatRGBAu8n, FormatBGRAu8n, FormatRu16n, FormatRi16n,
-                                FormatRGBAu16n, FormatRf16, FormatRGBAf16, FormatRf32, FormatRGBf32, FormatRGBAf32,
-                                FormatDf32, FormatDu16n}) {
+    for (const Format format :
+         {FormatRu8n, FormatRi8n, FormatRGu8n, FormatRGBAu8n, FormatBGRAu8n, FormatRu16n, FormatRi16n, FormatRGBAu16n,
+          FormatRf16, FormatRGBAf16, FormatRf32, FormatRGBf32, FormatRGBAf32, FormatDf32, FormatDu16n}) {
         Image image = Image::create(format, 2, 2).value();
         const Vector4f value(0.25f, 0.5f, 0.75f, 1.0f);
         image.store(1, 1, value);
@@ -265,14 +265,18 @@ TEST(Png, PalettesAndTransparentColours) {
     const RawPng gray = {.width = 2, .height = 1, .transparency = bytesOf({0, 7}), .rows = bytesOf({0, 7, 8})};
     EXPECT_EQ(decodePng(makePng(gray)).value(), Image::create(FormatRGu8n, 2, 1, bytesOf({7, 0, 8, 255})).value());
 
-    const RawPng color = {.width = 2, .height = 1, .color = 2, .transparency = bytesOf({0, 1, 0, 2, 0, 3}),
+    const RawPng color = {.width = 2,
+                          .height = 1,
+                          .color = 2,
+                          .transparency = bytesOf({0, 1, 0, 2, 0, 3}),
                           .rows = bytesOf({0, 1, 2, 3, 4, 5, 6})};
     const std::vector<std::byte> keyed = bytesOf({1, 2, 3, 0, 4, 5, 6, 255});
     EXPECT_EQ(decodePng(makePng(color)).value(), Image::create(FormatRGBAu8n, 2, 1, keyed).value());
 }
 
 TEST(Png, SixteenBitsAreInTheMachinesOrder) {
-    const RawPng raw = {.width = 1, .height = 1, .depth = 16, .color = 2, .rows = bytesOf({0, 0x12, 0x34, 0, 1, 0xff, 0xfe})};
+    const RawPng raw = {
+        .width = 1, .height = 1, .depth = 16, .color = 2, .rows = bytesOf({0, 0x12, 0x34, 0, 1, 0xff, 0xfe})};
     const Image image = decodePng(makePng(raw)).value();
     ASSERT_EQ(image.format(), FormatRGBAu16n);
     const Vector4f value = image.load(0, 0) * 65535.0f;
@@ -281,20 +285,28 @@ TEST(Png, SixteenBitsAreInTheMachinesOrder) {
 
 TEST(Png, Interlaced) {
     // Adam7: (0, 0), then (2, 0), then row 2 of even columns, then the odd column of even rows, then row 1.
-    const RawPng raw = {.width = 3, .height = 3, .is_interlaced = true,
-                        .rows = bytesOf({0, 1, 0, 3, 0, 7, 9, 0, 2, 0, 8, 0, 4, 5, 6})};
+    const RawPng raw = {
+        .width = 3, .height = 3, .is_interlaced = true, .rows = bytesOf({0, 1, 0, 3, 0, 7, 9, 0, 2, 0, 8, 0, 4, 5, 6})};
     EXPECT_EQ(decodePng(makePng(raw)).value(),
               Image::create(FormatRu8n, 3, 3, bytesOf({1, 2, 3, 4, 5, 6, 7, 8, 9})).value());
 }
 
 TEST(Png, HugeSizesTakeNoMemory) {
     const uint64_t before = residentMemory();
-    for (const auto& [width, height] : {std::pair(0x7fffffffu, 0x7fffffffu), {0x7fffffffu, 1u}, {1u, 0x7fffffffu},
-                                        {30000u, 30000u}, {0xffffffffu, 2u}, {0u, 5u}})
+    for (const auto& [width, height] : {std::pair(0x7fffffffu, 0x7fffffffu),
+                                        {0x7fffffffu, 1u},
+                                        {1u, 0x7fffffffu},
+                                        {30000u, 30000u},
+                                        {0xffffffffu, 2u},
+                                        {0u, 5u}})
         for (const int color : {0, 2, 3, 4, 6})
             for (const bool is_interlaced : {false, true}) {
-                const RawPng raw = {.width = width, .height = height, .color = color, .is_interlaced = is_interlaced,
-                                    .palette = bytesOf({1, 2, 3}), .rows = bytesOf({0, 0, 0, 0})};
+                const RawPng raw = {.width = width,
+                                    .height = height,
+                                    .color = color,
+                                    .is_interlaced = is_interlaced,
+                                    .palette = bytesOf({1, 2, 3}),
+                                    .rows = bytesOf({0, 0, 0, 0})};
                 EXPECT_THAT(decodePng(makePng(raw)), HasErrorId("image.png_malformed"));
             }
     EXPECT_LT(residentMemory(), before + (64u << 20));
@@ -308,11 +320,16 @@ TEST(Png, MutationsAreErrorsOrImages) {
         const size_t at = random.below(bytes.size() + 1);
         const auto place = bytes.begin() + static_cast<std::ptrdiff_t>(at);
         const uint64_t kind = random.below(4);
-        if (kind == 0) bytes.insert(place, static_cast<std::byte>(random.bits()));
-        else if (at == bytes.size()) return;
-        else if (kind == 1) bytes[at] = static_cast<std::byte>(random.bits());
-        else if (kind == 2) bytes[at] ^= static_cast<std::byte>(1u << random.below(8));
-        else bytes.resize(at);
+        if (kind == 0)
+            bytes.insert(place, static_cast<std::byte>(random.bits()));
+        else if (at == bytes.size())
+            return;
+        else if (kind == 1)
+            bytes[at] = static_cast<std::byte>(random.bits());
+        else if (kind == 2)
+            bytes[at] ^= static_cast<std::byte>(1u << random.below(8));
+        else
+            bytes.resize(at);
     };
     std::vector<std::vector<std::byte>> seeds;
     for (const Format format : png_formats) seeds.push_back(encodePng(randomImage(format, 13, 11)).value());
@@ -325,7 +342,10 @@ TEST(Png, MutationsAreErrorsOrImages) {
             constexpr int colors[] = {0, 2, 3, 4, 6};
             constexpr int channels[] = {1, 3, 1, 2, 4};
             const uint64_t color = random.below(5);
-            RawPng raw = {.width = 5, .height = 4, .depth = depths[random.below(5)], .color = colors[color],
+            RawPng raw = {.width = 5,
+                          .height = 4,
+                          .depth = depths[random.below(5)],
+                          .color = colors[color],
                           .is_interlaced = random.below(4) == 0};
             if (color == 1 || color == 2) raw.palette.resize(3 * (1 + random.below(16)));
             if (random.below(2)) raw.transparency.resize(random.below(7));

@@ -80,7 +80,8 @@ TEST(Bounds, SphereHoldsEveryPoint) {
         const BoundSphere sphere(points);
         for (const Vector3f& point : points)
             EXPECT_LE(glm::length(Vector3d(point) - Vector3d(sphere.center)), static_cast<double>(sphere.radius));
-        EXPECT_LE(static_cast<double>(sphere.radius), glm::length(Vector3d(BoundBox(points).size())) * 0.5 * (1 + 1e-6));
+        EXPECT_LE(static_cast<double>(sphere.radius),
+                  glm::length(Vector3d(BoundBox(points).size())) * 0.5 * (1 + 1e-6));
     }
 }
 
@@ -101,7 +102,8 @@ TEST(Camera, DefaultLooksAlongY) {
 
 TEST(Camera, DegenerateDirectionsGiveSomeFrame) {
     for (const Vector3f& to : {Vector3f(0, 0, 5), Vector3f(0, 0, -5), Vector3f(0, 0, 0), Vector3f(0, 5, 0)}) {
-        for (const Vector3f& up : {Vector3f(0, 0, 1), Vector3f(0, 0, 0), Vector3f(quiet_nan, 0, 0), Vector3f(0, 1, 0)}) {
+        for (const Vector3f& up :
+             {Vector3f(0, 0, 1), Vector3f(0, 0, 0), Vector3f(quiet_nan, 0, 0), Vector3f(0, 1, 0)}) {
             const Camera camera = Camera().lookAt({0, 0, 0}, to, up);
             EXPECT_NEAR(glm::length(camera.right()), 1.0f, 1e-6f);
             EXPECT_NEAR(glm::dot(camera.right(), camera.forward()), 0.0f, 1e-6f);

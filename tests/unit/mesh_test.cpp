@@ -78,7 +78,8 @@ TEST(Obj, VerticesAreMergedByTriple) {
 TEST(Obj, PartialAttributesAreDroppedWithAWarning) {
     std::string ids;
     setLogCallback([&](LogLevel, std::string_view id, std::string_view) { ids += id; });
-    const Expected<Mesh> mesh = parse("v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf 1/1/1 2//1 3//1\n");
+    const Expected<Mesh> mesh =
+        parse("v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0 0\nvn 0 0 1\nf 1//1 2//1 3//1\nf 1/1/1 2//1 3//1\n");
     setLogCallback({});
     ASSERT_THAT(mesh, IsOk());
     EXPECT_EQ(mesh->normals.size(), mesh->positions.size());
@@ -157,11 +158,11 @@ TEST(Obj, CornersAndMemoryAreBounded) {
 
 TEST(Obj, MutationsAreErrorsOrValidMeshes) {
     setLogCallback([](LogLevel, std::string_view, std::string_view) {});
-    const std::vector<std::string> seeds = {
-        std::string(triangle),
-        "o a\nv 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 1e-3\nvt 0 0\nvt 1 1\nvn 0 0 1\nvn 1 0 0\ng b\nf 1/1/1 2/2/1 3/1/2 4/2/2\n"
-        "f -1//-1 -2//-2 -3//-1\nf 1/1 2/2 3/1\nf 1 2 3 4 2 1\n",
-        "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n"};
+    const std::vector<std::string> seeds = {std::string(triangle),
+                                            "o a\nv 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 1e-3\nvt 0 0\nvt 1 1\nvn 0 0 "
+                                            "1\nvn 1 0 0\ng b\nf 1/1/1 2/2/1 3/1/2 4/2/2\n"
+                                            "f -1//-1 -2//-2 -3//-1\nf 1/1 2/2 3/1\nf 1 2 3 4 2 1\n",
+                                            "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\nf 1 2 3 4 5\n"};
     constexpr std::string_view letters = "0123456789 -+./evnftog\n\r\t#\0\xff";
     Random random(11);
     int readable = 0;
@@ -260,7 +261,8 @@ TEST(Mesh, ValidateNamesTheElement) {
     mesh.positions[2].y = -std::numeric_limits<float>::infinity();
     EXPECT_THAT(mesh.validate(), HasErrorId("mesh.not_finite"));
     EXPECT_NE(mesh.validate().error().message().find("position 2"), std::string::npos);
-    for (const MeshPart& part : {MeshPart{"a", 0, 6}, MeshPart{"a", 1, 3}, MeshPart{"a", 0, 2}, MeshPart{"a", 3, 0xffffffff}}) {
+    for (const MeshPart& part :
+         {MeshPart{"a", 0, 6}, MeshPart{"a", 1, 3}, MeshPart{"a", 0, 2}, MeshPart{"a", 3, 0xffffffff}}) {
         mesh = valid;
         mesh.parts = {part};
         EXPECT_THAT(mesh.validate(), HasErrorId("mesh.part_range"));
@@ -310,8 +312,7 @@ TEST(Mesh, Files) {
     ASSERT_THAT(writeTextFile(dir / "bad.OBJ", "v 0 0 0\nf 1 2 3\n"), IsOk());
     const Expected<Mesh> bad = Mesh::load(dir / "bad.OBJ");
     ASSERT_THAT(bad, HasErrorId("mesh.index_range"));
-    EXPECT_EQ(bad.error().text(),
-              "bad.OBJ:2: face 1: '2' names no position; 1 of them stand above [mesh.index_range]");
+    EXPECT_EQ(bad.error().text(), "bad.OBJ:2: face 1: '2' names no position; 1 of them stand above [mesh.index_range]");
 }
 
 TEST(Mesh, StanfordBunny) {

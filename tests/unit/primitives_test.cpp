@@ -49,7 +49,8 @@ void expectGoodNormals(const Mesh& mesh) {
     for (const Vector3f& normal : mesh.normals) EXPECT_NEAR(glm::length(normal), 1.0f, 1e-6f);
     for (size_t i = 0; i < mesh.indices.size(); i += 3) {
         const Vector3f& a = mesh.positions[mesh.indices[i]];
-        const Vector3f face = glm::cross(mesh.positions[mesh.indices[i + 1]] - a, mesh.positions[mesh.indices[i + 2]] - a);
+        const Vector3f face =
+            glm::cross(mesh.positions[mesh.indices[i + 1]] - a, mesh.positions[mesh.indices[i + 2]] - a);
         EXPECT_GT(glm::dot(face, mesh.normals[mesh.indices[i]]), 0.0f) << "triangle " << i / 3;
     }
 }
@@ -109,7 +110,8 @@ TEST(Primitives, NoRayLeavesAClosedMesh) {
     Random random(5);
     const Mesh torus = createTorus(2.0f, 0.5f, 24, 12);
     const Mesh sphere = createSphere(1.0f, 2);
-    for (const auto& [mesh, origin] : {std::pair(&torus, Vector3d(2, 0.05, 0.03)), {&sphere, Vector3d(0.1, 0.2, 0.05)}}) {
+    for (const auto& [mesh, origin] :
+         {std::pair(&torus, Vector3d(2, 0.05, 0.03)), {&sphere, Vector3d(0.1, 0.2, 0.05)}}) {
         for (int i = 0; i < 500; i++) {
             const size_t triangle = random.below(mesh->triangleCount());
             const Vector3d a(mesh->positions[mesh->indices[3 * triangle]]);

@@ -1,0 +1,175 @@
+#include "shader_source.h"
+
+#include <glint/base/format_error.h>
+#include <glint/base/log.h>
+
+#include <glslang/Public/ResourceLimits.h>
+#include <glslang/Public/ShaderLang.h>
+#include <glslang/SPIRV/GlslangToSpv.h>
+#include <spirv/unified1/spirv.hpp>
+
+#include <charconv>
+#include <mutex>
+
+namespace glint::shader {
+
+namespace {
+
+EShLanguage languageOf(ShaderStage stage) {
+    switch (stage) {
+        case ShaderStage::Vertex: return EShLangVertex;
+        case ShaderStage::Control: return EShLangTessControl;
+        case ShaderStage::Evaluate: return EShLangTessEvaluation;
+        case ShaderStage::Geometry: return EShLangGeometry;
+        case ShaderStage::Fragment: return EShLangFragment;
+        case ShaderStage::Task: return EShLangTask;
+        case ShaderStage::Mesh: return EShLangMesh;
+        case ShaderStage::RayGen: return EShLangRayGen;
+        case ShaderStage::RayMiss: return EShLangMiss;
+        case ShaderStage::Closest: return EShLangClosestHit;
+        case ShaderStage::FirstHit: return EShLangAnyHit;
+        case ShaderStage::Intersection: return EShLangIntersect;
+        case ShaderStage::Callable: return EShLangCallable;
+        case ShaderStage::Compute:
+        case ShaderStage::Count: break;
+    }
+    return EShLangCompute;
+}
+
+/// One line of the compiler's log, taken apart.
+struct Message {
+    bool is_error = false;
+    uint32_t source = 0;
+    uint32_t line = 0;  ///< 0 if the message has no place
+    std::string text;
+};
+
+/// "ERROR: 2:7: 'x' : undeclared identifier", where 2 is the number of the source string.
+std::vector<Message> parseLog(std::string_view log) {
+    std::vector<Message> messages;
+    while (!log.empty()) {
+        const size_t end = std::min(log.find('\n'), log.size());
+        std::string_view line = log.substr(0, end);
+        log.remove_prefix(std::min(end + 1, log.size()));
+
+        Message message;
+        const size_t colon = line.find(": ");
+        const std::string_view severity = line.substr(0, std::min(colon, line.size()));
+        if (severity == "ERROR" || severity == "INTERNAL ERROR" || severity == "UNIMPLEMENTED")
+            message.is_error = true;
+        else if (severity != "WARNING") {
+            // A message may go on in the next line.
+            if (!messages.empty() && !line.empty()) messages.back().text.append("\n").append(line);
+            continue;
+        }
+        line.remove_prefix(colon + 2);
+        if (line.find("compilation errors.") != std::string_view::npos) continue;
+        const char* last = line.data() + line.size();
+        const auto [after_source, no_source] = std::from_chars(line.data(), last, message.source);
+        if (no_source == std::errc() && after_source != last && *after_source == ':') {
+            const auto [after_line, no_line] = std::from_chars(after_source + 1, last, message.line);
+            if (no_line == std::errc() && after_line != last && *after_line == ':') {
+                line.remove_prefix(static_cast<size_t>(after_line + 1 - line.data()));
+                while (line.starts_with(' ')) line.remove_prefix(1);
+            }
+        }
+        while (line.ends_with(' ')) line.remove_suffix(1);
+        message.text = line;
+        messages.push_back(std::move(message));
+    }
+    return messages;
+}
+
+std::string fileOf(const ShaderSource& source, const Preprocessed& text, const Message& message) {
+    return message.source < text.sources.size() ? text.sources[message.source] : displayName(source);
+}
+
+void logWarnings(const ShaderSource& source, const Preprocessed& text, const std::vector<Message>& messages) {
+    for (const Message& message : messages) {
+        if (message.is_error) continue;
+        const Error error = sourceError(source, ErrorCode::ShaderCompile, "shader.warning", message.text,
+                                        fileOf(source, text, message), message.line);
+        log(LogLevel::Warning, error.id(), error.text());
+    }
+}
+
+/// The first error, with those of other lines below it: the others of the same line tend to follow from the first.
+Error firstError(const ShaderSource& source, const Preprocessed& text, const std::vector<Message>& messages) {
+    static constexpr size_t max_messages = 8;
+    const Message* first = nullptr;
+    const Message* last = nullptr;
+    std::string full;
+    size_t count = 0;
+    for (const Message& message : messages) {
+        if (!message.is_error || (last && message.source == last->source && message.line == last->line)) continue;
+        if (!first) {
+            first = &message;
+            full = message.text;
+        } else if (count < max_messages && message.line) {
+            full += fmt::format("\n  {}:{}: {}", fileOf(source, text, message), message.line, message.text);
+        }
+        last = &message;
+        count++;
+    }
+    if (!first) return sourceError(source, ErrorCode::ShaderCompile, "shader.compile", "the compiler gave no reason");
+    const char* id = first->text.find("Missing entry point") != std::string::npos ? "shader.entry" : "shader.compile";
+    return sourceError(source, ErrorCode::ShaderCompile, id, std::move(full), fileOf(source, text, *first),
+                       first->line);
+}
+
+/// OpSourceExtension only repeats the #extension lines, most of which are not the user's.
+void dropSourceExtensions(std::vector<uint32_t>& words) {
+    size_t out = 5;
+    for (size_t i = 5; i < words.size();) {
+        const uint32_t length = words[i] >> 16;
+        if (length == 0 || length > words.size() - i) return;
+        const bool keep = (words[i] & 0xffffu) != spv::OpSourceExtension;
+        for (uint32_t k = 0; keep && k < length; k++) words[out++] = words[i + k];
+        i += length;
+    }
+    words.resize(out);
+}
+
+}  // namespace
+
+Expected<std::vector<uint32_t>> compile(const ShaderSource& source, const Preprocessed& text) {
+    // Never finalised: other threads may be compiling while static objects are destroyed.
+    static std::once_flag initialized;
+    std::call_once(initialized, [] { glslang::InitializeProcess(); });
+
+    const EShLanguage language = languageOf(source.stage);
+    const auto rules = static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules);
+    const char* string = text.text.data();
+    const int length = static_cast<int>(text.text.size());
+    glslang::TShader shader(language);
+    shader.setStringsWithLengths(&string, &length, 1);
+    shader.setEnvInput(glslang::EShSourceGlsl, language, glslang::EShClientVulkan, 100);
+    shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_3);
+    shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_6);
+    shader.setEntryPoint(source.entry.c_str());
+    shader.setSourceEntryPoint(source.entry.c_str());
+    const bool parsed = shader.parse(GetDefaultResources(), 460, false, rules);
+    std::vector<Message> messages = parseLog(shader.getInfoLog());
+    logWarnings(source, text, messages);
+    if (!parsed) return unexpected(firstError(source, text, messages));
+
+    glslang::TProgram program;
+    program.addShader(&shader);
+    const bool linked = program.link(rules);
+    messages = parseLog(program.getInfoLog());
+    logWarnings(source, text, messages);
+    if (!linked) return unexpected(firstError(source, text, messages));
+
+    std::vector<uint32_t> words;
+    spv::SpvBuildLogger logger;
+    glslang::SpvOptions options;
+    options.disableOptimizer = true;
+    glslang::GlslangToSpv(*program.getIntermediate(language), words, &logger, &options);
+    if (words.size() < 5)
+        return unexpected(sourceError(source, ErrorCode::ShaderCompile, "shader.compile",
+                                      fmt::format("no SPIR-V was made: {}", logger.getAllMessages())));
+    dropSourceExtensions(words);
+    return words;
+}
+
+}  // namespace glint::shader

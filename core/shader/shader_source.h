@@ -1,0 +1,69 @@
+#pragma once
+
+// For sources only: what the shader steps share.
+
+#include <glint/shader/shader_compiler.h>
+
+#include <memory>
+#include <optional>
+
+namespace glint::shader {
+
+struct Macro {
+    std::string name;
+    std::string value;
+};
+
+/// The global macros and, before them in rank, the source's own. Error: "shader.macro".
+Expected<std::vector<Macro>> collectMacros(const ShaderSource& source);
+
+/// "A=1; B": how messages give a set of macros.
+std::string describeMacros(const std::vector<Macro>& macros);
+
+/// The name a source goes by in messages.
+std::string displayName(const ShaderSource& source);
+
+/// An error of one source, in its own file unless `file` says otherwise, with its macros.
+Error sourceError(const ShaderSource& source, ErrorCode code, const char* id, std::string message,
+                  std::string file = {}, uint32_t line = 0);
+
+/// A file that #include has found.
+struct Included {
+    std::string name;      ///< for messages, and what its own includes are relative to
+    std::string identity;  ///< equal for the same file however it was reached
+    std::shared_ptr<const std::string> text;
+    enum class Origin : uint8_t { Memory, Disk, Embedded } origin = Origin::Disk;
+    FileStamp stamp;  ///< on the disk only
+};
+
+/// The identity of a file on the disk.
+std::string diskIdentity(const std::filesystem::path& path);
+
+/// Finds what #include "name" (or <name>) means in the file `from`. Nothing if there is no such file; an error if
+/// there is one that cannot be read.
+Expected<std::optional<Included>> findInclude(const ShaderSource& source, std::string_view name, bool quoted,
+                                              const Included& from);
+
+/// The #extension lines a stage needs for everything that GLSL for Vulkan 1.3 offers there.
+std::string extensionLines(ShaderStage stage, bool with_explicit_types);
+
+/// Whether types of explicit width other than 64-bit integers (float16_t, u8vec4, ...) occur in the text.
+bool usesExplicitTypes(std::string_view text);
+
+/// Words in this machine's byte order: SPIR-V may come in either.
+std::vector<uint32_t> nativeWords(std::span<const uint32_t> words);
+
+/// `validate` without the check of the stage; the words' own complaint, or nothing. `position` is the index of the
+/// instruction that it concerns.
+std::optional<std::string> findFault(std::span<const uint32_t> words, uint64_t* position = nullptr);
+
+/// Whether the module has the entry point that the source asks for. Errors: "shader.stage", "shader.entry".
+Status checkEntry(const ShaderSource& source, std::span<const uint32_t> words);
+
+/// `optimize` for words that have passed `findFault`.
+Expected<std::vector<uint32_t>> optimizeValid(const ShaderSource& source, std::span<const uint32_t> words);
+
+/// `reflect` for words that have passed `findFault`.
+Expected<Reflection> reflectValid(std::span<const uint32_t> words, ShaderStage stage, std::string_view entry);
+
+}  // namespace glint::shader

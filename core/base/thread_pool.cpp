@@ -24,6 +24,11 @@ ThreadPool& ThreadPool::shared() {
     return pool;
 }
 
+ThreadPool& ThreadPool::shared() {
+    static ThreadPool pool;
+    return pool;
+}
+
 void ThreadPool::submit(std::function<void()> task) {
     {
         std::lock_guard lock(mutex_);

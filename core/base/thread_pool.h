@@ -20,6 +20,10 @@ public:
     /// Runs what is queued, then ends the workers. Not to be called from a task of the pool.
     ~ThreadPool();
 
+    /// The pool that background creation runs on: one worker per core, made at the first call. Its tasks end before the
+    /// static objects that were made before that call are destroyed.
+    static ThreadPool& shared();
+
     ThreadPool(const ThreadPool&) = delete;
     ThreadPool& operator=(const ThreadPool&) = delete;
 

@@ -22,7 +22,8 @@ struct MemoryIncludes {
 };
 
 MemoryIncludes& memoryIncludes() {
-    static MemoryIncludes instance;
+    // Never destroyed: background compilations may still run while static objects are.
+    static MemoryIncludes& instance = *new MemoryIncludes;
     return instance;
 }
 

@@ -17,7 +17,8 @@ struct Globals {
 };
 
 Globals& globals() {
-    static Globals instance;
+    // Never destroyed: background compilations may still run while static objects are.
+    static Globals& instance = *new Globals;
     return instance;
 }
 

@@ -46,7 +46,8 @@ struct CacheState {
 };
 
 CacheState& cacheState() {
-    static CacheState instance;
+    // Never destroyed: background compilations may still run while static objects are.
+    static CacheState& instance = *new CacheState;
     return instance;
 }
 

@@ -24,11 +24,6 @@ ThreadPool& ThreadPool::shared() {
     return pool;
 }
 
-ThreadPool& ThreadPool::shared() {
-    static ThreadPool pool;
-    return pool;
-}
-
 void ThreadPool::submit(std::function<void()> task) {
     {
         std::lock_guard lock(mutex_);

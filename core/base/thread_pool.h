@@ -27,9 +27,6 @@ public:
     ThreadPool(const ThreadPool&) = delete;
     ThreadPool& operator=(const ThreadPool&) = delete;
 
-    /// The process' own pool, one worker per core.
-    static ThreadPool& shared();
-
     /// From any thread.
     void submit(std::function<void()> task);
 

@@ -1,0 +1,98 @@
+#pragma once
+
+// What the benchmarks share: figures, the loop that compares two sides fairly, and the device they run on.
+
+#include <glint/device/device.h>
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace glint::bench {
+
+struct Figure {
+    std::string name;
+    double value = 0.0;
+    std::string unit;
+    std::string against;
+    std::string device;
+    std::string command;
+};
+
+struct Options {
+    std::string filter;
+    std::filesystem::path json = "out/figures.json";
+    bool list = false;
+    bool long_runs = false;
+};
+
+/// Collects the figures of one run of the program.
+class Report {
+public:
+    explicit Report(const Options& options) : options_(options) {}
+
+    const Options& options() const { return options_; }
+    /// `command` is the benchmark that makes the figure again.
+    void add(std::string name, double value, std::string unit, std::string against, std::string device);
+    /// Writes the figures over those of the same names in the file and keeps the others.
+    void write() const;
+
+private:
+    const Options& options_;
+    std::vector<Figure> figures_;
+};
+
+struct Benchmark {
+    std::vector<std::string> figures;
+    std::function<void(Report&)> run;
+};
+
+// One for each source of this folder.
+Benchmark dispatchBenchmark();
+Benchmark drawBenchmark();
+Benchmark warmFrameBenchmark();
+Benchmark tracingFrameBenchmark();
+Benchmark startupBenchmark();
+Benchmark memoryBenchmark();
+
+/// A failure that ends one benchmark and not the others.
+template <class T>
+decltype(auto) check(T&& result) {
+    if (!result) throw std::runtime_error(result.error().text());
+    return std::forward<T>(result);
+}
+
+/// The adapter that $GLINT_ADAPTER or the default chooses, without validation.
+Device createDevice();
+/// "llvmpipe (LLVM 15.0.6, 256 bits), Mesa 25.0.7, AMD EPYC": adapter, driver and processor.
+std::string deviceName(const Device& device);
+std::string processorName();
+
+/// Seconds that the calling thread has spent on a processor: what other threads and processes do is left out.
+double threadSeconds();
+double wallSeconds();
+
+/// Median, and the smallest, of times in seconds.
+struct Times {
+    std::vector<double> values;
+    double median() const;
+    double minimum() const;
+};
+
+struct Side {
+    std::function<void()> timed;
+    std::function<void()> untimed;  ///< after each timed part, such as the wait for the device
+};
+
+/// Runs all sides in turn, `warm_up` + `rounds` times, and returns the calling thread's seconds of each.
+std::vector<Times> interleave(std::span<const Side> sides, uint32_t warm_up, uint32_t rounds);
+
+/// "label    median 1.234 ms  minimum 1.200 ms"
+void printTimes(std::string_view label, const Times& times);
+
+}  // namespace glint::bench

@@ -36,7 +36,7 @@ Expected<Bytes> readAll(const std::filesystem::path& path, uint64_t limit) {
                                     path.string(), size, limit));
     Bytes bytes;
     bytes.resize(size);
-    if (std::fread(bytes.data(), 1, size, file.get()) != size)
+    if (size != 0 && std::fread(bytes.data(), 1, size, file.get()) != size)
         return unexpected(makeError(ErrorCode::Io, "file.read", "cannot read {} bytes of '{}'", size, path.string()));
     return bytes;
 }
@@ -53,12 +53,12 @@ Expected<std::string> readTextFile(const std::filesystem::path& path, uint64_t l
 
 Status writeFile(const std::filesystem::path& path, std::span<const std::byte> bytes) {
     static std::atomic<uint32_t> counter = 0;
-    const std::filesystem::path temporary =
-        path.string() + fmt::format(".{}.{}.tmp", ::getpid(), counter.fetch_add(1));
+    const std::filesystem::path temporary = path.string() + fmt::format(".{}.{}.tmp", ::getpid(), counter.fetch_add(1));
     FilePtr file(std::fopen(temporary.c_str(), "wb"));
     if (!file)
         return makeError(ErrorCode::Io, "file.create", "cannot create '{}': {}", path.string(), std::strerror(errno));
-    const bool written = std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
+    // An empty span may have no address, which the C library does not take.
+    const bool written = bytes.empty() || std::fwrite(bytes.data(), 1, bytes.size(), file.get()) == bytes.size();
     const bool closed = std::fclose(file.release()) == 0;
     std::error_code failure;
     if (written && closed) std::filesystem::rename(temporary, path, failure);

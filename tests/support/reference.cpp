@@ -4,6 +4,8 @@
 
 #include <bit>
 #include <cmath>
+#include <map>
+#include <tuple>
 
 namespace glint::test {
 
@@ -50,6 +52,44 @@ ReferenceHit closestHit(const Mesh& mesh, const Vector3d& origin, const Vector3d
     }
     if (!best.hit) best.t = 0.0;
     return best;
+}
+
+bool isClosed(const Mesh& mesh) {
+    using Point = std::tuple<float, float, float>;
+    std::map<std::pair<Point, Point>, int> edges;
+    const auto point = [&](size_t i) {
+        const Vector3f& p = mesh.positions[mesh.indices[i]];
+        return Point(p.x, p.y, p.z);
+    };
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
+        for (size_t k = 0; k < 3; k++) edges[{point(i + k), point(i + (k + 1) % 3)}]++;
+    for (const auto& [edge, count] : edges) {
+        const auto opposite = edges.find({edge.second, edge.first});
+        if (count != 1 || opposite == edges.end() || opposite->second != 1) return false;
+    }
+    return true;
+}
+
+double volumeOf(const Mesh& mesh) {
+    double volume = 0.0;
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+        const Vector3d a(mesh.positions[mesh.indices[i]]);
+        const Vector3d b(mesh.positions[mesh.indices[i + 1]]);
+        const Vector3d c(mesh.positions[mesh.indices[i + 2]]);
+        volume += glm::dot(a, glm::cross(b, c)) / 6.0;
+    }
+    return volume;
+}
+
+double areaOf(const Mesh& mesh) {
+    double area = 0.0;
+    for (size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+        const Vector3d a(mesh.positions[mesh.indices[i]]);
+        const Vector3d b(mesh.positions[mesh.indices[i + 1]]);
+        const Vector3d c(mesh.positions[mesh.indices[i + 2]]);
+        area += glm::length(glm::cross(b - a, c - a)) / 2.0;
+    }
+    return area;
 }
 
 Vector3d Random::direction() {

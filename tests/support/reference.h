@@ -27,6 +27,12 @@ struct ReferenceHit {
 ReferenceHit closestHit(const Mesh& mesh, const Vector3d& origin, const Vector3d& direction, double t_min = 0.0,
                         double t_max = 1e300);
 
+/// True if every directed edge has its opposite exactly once: by position, so that split vertices count as one.
+bool isClosed(const Mesh& mesh);
+/// Volume within a closed mesh; negative if front faces are clockwise seen from outside.
+double volumeOf(const Mesh& mesh);
+double areaOf(const Mesh& mesh);
+
 /// A generator of random numbers whose values are the same with every standard library.
 class Random {
 public:

@@ -7,42 +7,10 @@
 
 #include <gtest/gtest.h>
 
-#include <map>
-#include <tuple>
-
 using namespace glint;
 using namespace glint::test;
 
 namespace {
-
-using Point = std::tuple<float, float, float>;
-
-// Every directed edge of a closed mesh has its opposite exactly once. By position, so that split vertices count as one.
-bool isClosed(const Mesh& mesh) {
-    std::map<std::pair<Point, Point>, int> edges;
-    const auto point = [&](size_t i) {
-        const Vector3f& p = mesh.positions[mesh.indices[i]];
-        return Point(p.x, p.y, p.z);
-    };
-    for (size_t i = 0; i < mesh.indices.size(); i += 3)
-        for (size_t k = 0; k < 3; k++) edges[{point(i + k), point(i + (k + 1) % 3)}]++;
-    for (const auto& [edge, count] : edges) {
-        const auto opposite = edges.find({edge.second, edge.first});
-        if (count != 1 || opposite == edges.end() || opposite->second != 1) return false;
-    }
-    return true;
-}
-
-double volumeOf(const Mesh& mesh) {
-    double volume = 0.0;
-    for (size_t i = 0; i < mesh.indices.size(); i += 3) {
-        const Vector3d a(mesh.positions[mesh.indices[i]]);
-        const Vector3d b(mesh.positions[mesh.indices[i + 1]]);
-        const Vector3d c(mesh.positions[mesh.indices[i + 2]]);
-        volume += glm::dot(a, glm::cross(b, c)) / 6.0;
-    }
-    return volume;
-}
 
 void expectGoodNormals(const Mesh& mesh) {
     ASSERT_EQ(mesh.normals.size(), mesh.positions.size());

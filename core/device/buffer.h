@@ -19,10 +19,10 @@ public:
         FlagIndex = 1u << 3,
         FlagIndirect = 1u << 4,
         FlagTexel = 1u << 5,
-        FlagAddress = 1u << 6,   ///< shaders reach it by address; needs FeatureBufferAddress
-        FlagTracing = 1u << 7,   ///< input of an acceleration structure build
-        FlagScratch = 1u << 8,   ///< scratch memory of builds
-        FlagMapped = 1u << 9,    ///< in host memory, at map() for its whole life
+        FlagAddress = 1u << 6,  ///< shaders reach it by address; needs FeatureBufferAddress
+        FlagTracing = 1u << 7,  ///< input of an acceleration structure build
+        FlagScratch = 1u << 8,  ///< scratch memory of builds
+        FlagMapped = 1u << 9,   ///< in host memory, at map() for its whole life
     };
     using Flags = uint32_t;
 

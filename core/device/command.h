@@ -34,7 +34,8 @@ public:
     }
 
     /// In pixels from the top left corner; the whole target by default.
-    void setViewport(float x, float y, float width, float height, float minimum_depth = 0.0f, float maximum_depth = 1.0f);
+    void setViewport(float x, float y, float width, float height, float minimum_depth = 0.0f,
+                     float maximum_depth = 1.0f);
     void setScissor(int32_t x, int32_t y, uint32_t width, uint32_t height);
     /// Constant of BlendFuncFactor.
     void setBlendFactor(const Color& color);

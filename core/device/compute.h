@@ -3,7 +3,6 @@
 #include <glint/device/kernel.h>
 #include <glint/device/recorder.h>
 
-
 namespace glint {
 
 /// Records dispatches, copies and builds. Made by Device::createCompute.
@@ -22,9 +21,10 @@ public:
     void dispatchIndirect(const Buffer& buffer, uint64_t offset = 0, Where where = Where::current());
 
     /// Copies. Offsets and sizes in bytes; buffers must not overlap. Errors: "copy.range", "copy.overlap".
-    void setBuffer(const Buffer& buffer, uint64_t offset, const void* data, uint64_t size, Where where = Where::current());
-    void copyBuffer(const Buffer& destination, uint64_t destination_offset, const Buffer& source, uint64_t source_offset,
-                    uint64_t size, Where where = Where::current());
+    void setBuffer(const Buffer& buffer, uint64_t offset, const void* data, uint64_t size,
+                   Where where = Where::current());
+    void copyBuffer(const Buffer& destination, uint64_t destination_offset, const Buffer& source,
+                    uint64_t source_offset, uint64_t size, Where where = Where::current());
     /// Fills with a 32-bit value; offset and size are multiples of 4, size 0 is all that is left.
     void clearBuffer(const Buffer& buffer, uint32_t value = 0, uint64_t offset = 0, uint64_t size = 0,
                      Where where = Where::current());
@@ -41,7 +41,8 @@ public:
     void copyBufferToTexture(const Texture& destination, const Buffer& source, uint64_t offset, const Slice& slice = {},
                              const Region& region = {}, Where where = Where::current());
     /// All texels of the slice; depth in color.r, stencil in color.g.
-    void clearTexture(const Texture& texture, const Color& color, const Slice& slice = {}, Where where = Where::current());
+    void clearTexture(const Texture& texture, const Color& color, const Slice& slice = {},
+                      Where where = Where::current());
     /// Fills the mip levels above 0 from level 0, each from the one below.
     void createMipmaps(const Texture& texture, Where where = Where::current());
 
@@ -50,12 +51,12 @@ public:
                       Where where = Where::current());
     /// Builds a structure; without a scratch buffer the SDK brings one.
     void buildTracing(const Tracing& tracing, Where where = Where::current());
-    void buildTracing(const Tracing& tracing, const Buffer& scratch, uint64_t offset = 0, Where where = Where::current());
+    void buildTracing(const Tracing& tracing, const Buffer& scratch, uint64_t offset = 0,
+                      Where where = Where::current());
     /// Refits a structure made with FlagUpdate to moved vertices.
     void updateTracing(const Tracing& tracing, Where where = Where::current());
     void updateTracing(const Tracing& tracing, const Buffer& scratch, uint64_t offset = 0,
                        Where where = Where::current());
-
 };
 
 }  // namespace glint

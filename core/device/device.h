@@ -18,6 +18,7 @@
 #include <glint/device/tracing.h>
 #include <glint/device/types.h>
 
+#include <array>
 #include <functional>
 #include <initializer_list>
 #include <source_location>
@@ -38,8 +39,8 @@ using MessageCallback = std::function<void(const Message&)>;
 
 /// How a device is chosen and made.
 struct DeviceDesc {
-    std::string api;          ///< "vulkan" or "null"; empty: $GLINT_API, else "vulkan"
-    std::string adapter;      ///< index or part of a name; empty: $GLINT_ADAPTER, else the best
+    std::string api;                     ///< "vulkan" or "null"; empty: $GLINT_API, else "vulkan"
+    std::string adapter;                 ///< index or part of a name; empty: $GLINT_ADAPTER, else the best
     FeatureMask required = FeatureNone;  ///< creation fails without them
     FeatureMask optional = FeatureAll;   ///< enabled where the adapter has them
     /// Khronos validation layer with synchronisation checks. Default: $GLINT_VALIDATION is 1, or a debug build.
@@ -50,7 +51,7 @@ struct DeviceDesc {
 
 /// Memory and objects that a device holds.
 struct DeviceMemory {
-    uint64_t bytes = 0;            ///< of device memory
+    uint64_t bytes = 0;  ///< of device memory
     uint64_t allocations = 0;
     uint64_t objects_created = 0;  ///< native objects made so far, released ones included
 };
@@ -139,13 +140,14 @@ public:
 
     // Transfers and builds: queued, and played before the next submit, in the order of the calls.
 
-    void setBuffer(const Buffer& buffer, uint64_t offset, const void* data, uint64_t size, Where where = Where::current());
+    void setBuffer(const Buffer& buffer, uint64_t offset, const void* data, uint64_t size,
+                   Where where = Where::current());
     template <class T>
     void setBuffer(const Buffer& buffer, std::span<T> data, Where where = Where::current()) {
         setBuffer(buffer, 0, data.data(), data.size_bytes(), where);
     }
-    void copyBuffer(const Buffer& destination, uint64_t destination_offset, const Buffer& source, uint64_t source_offset,
-                    uint64_t size, Where where = Where::current());
+    void copyBuffer(const Buffer& destination, uint64_t destination_offset, const Buffer& source,
+                    uint64_t source_offset, uint64_t size, Where where = Where::current());
     void clearBuffer(const Buffer& buffer, uint32_t value = 0, uint64_t offset = 0, uint64_t size = 0,
                      Where where = Where::current());
     void setTexture(const Texture& texture, const void* data, uint64_t size, const Slice& slice = {},
@@ -153,9 +155,11 @@ public:
     void copyTexture(const Texture& destination, const Slice& destination_slice, const Texture& source,
                      const Slice& source_slice, const Region& source_region = {}, uint32_t x = 0, uint32_t y = 0,
                      uint32_t z = 0, Where where = Where::current());
-    void clearTexture(const Texture& texture, const Color& color, const Slice& slice = {}, Where where = Where::current());
+    void clearTexture(const Texture& texture, const Color& color, const Slice& slice = {},
+                      Where where = Where::current());
     void createMipmaps(const Texture& texture, Where where = Where::current());
-    void setTracing(const Tracing& tracing, std::span<const Tracing::Instance> instances, Where where = Where::current());
+    void setTracing(const Tracing& tracing, std::span<const Tracing::Instance> instances,
+                    Where where = Where::current());
     /// With a scratch buffer of the caller's of at least getBuildSize() bytes.
     void buildTracing(const Tracing& tracing, const Buffer& scratch, Where where = Where::current());
     void buildTracing(const Tracing& tracing, Where where = Where::current());
@@ -218,6 +222,9 @@ public:
     Expected<uint64_t> getTime(const Query& query, Where where = Where::current());
     Expected<uint64_t> getSamples(const Query& query, Where where = Where::current());
     Expected<Query::Statistics> getStatistics(const Query& query, Where where = Where::current());
+
+private:
+    Expected<std::array<uint64_t, 7>> queryWords(const Query& query, Query::Type type, Where where);
 };
 
 }  // namespace glint

@@ -8,23 +8,23 @@ namespace glint {
 
 /// What a device can do beyond the core that Glint always needs. DeviceDesc asks for features by these bits.
 enum Feature : uint64_t {
-    FeatureComputeTracing = 1ull << 0,     ///< ray queries in compute shaders
-    FeatureFragmentTracing = 1ull << 1,    ///< ray queries in vertex and fragment shaders
-    FeatureRayTracing = 1ull << 2,         ///< ray-tracing pipelines
-    FeatureMeshShader = 1ull << 3,         ///< task and mesh shaders
-    FeatureBufferAddress = 1ull << 4,      ///< Buffer::getAddress and buffer references in shaders
-    FeatureTextureTable = 1ull << 5,       ///< arrays of textures of unknown length, indexed non-uniformly
+    FeatureComputeTracing = 1ull << 0,   ///< ray queries in compute shaders
+    FeatureFragmentTracing = 1ull << 1,  ///< ray queries in vertex and fragment shaders
+    FeatureRayTracing = 1ull << 2,       ///< ray-tracing pipelines
+    FeatureMeshShader = 1ull << 3,       ///< task and mesh shaders
+    FeatureBufferAddress = 1ull << 4,    ///< Buffer::getAddress and buffer references in shaders
+    FeatureTextureTable = 1ull << 5,     ///< arrays of textures of unknown length, indexed non-uniformly
     FeatureShaderf16 = 1ull << 6,
     FeatureShaderf64 = 1ull << 7,
     FeatureShaderu8 = 1ull << 8,
     FeatureShaderu16 = 1ull << 9,
     FeatureShaderu64 = 1ull << 10,
-    FeatureAtomicBufferu64 = 1ull << 11,   ///< 64-bit atomics on buffers
+    FeatureAtomicBufferu64 = 1ull << 11,  ///< 64-bit atomics on buffers
     FeatureGeometryShader = 1ull << 12,
     FeatureTessellation = 1ull << 13,
     FeatureAnisotropy = 1ull << 14,
     FeatureCubeArray = 1ull << 15,
-    FeatureIndirectCount = 1ull << 16,     ///< draw counts from a buffer
+    FeatureIndirectCount = 1ull << 16,  ///< draw counts from a buffer
     FeatureMultiDrawIndirect = 1ull << 17,
     FeatureWireframe = 1ull << 18,
     FeatureDepthClamp = 1ull << 19,
@@ -70,24 +70,24 @@ struct Features {
     uint32_t maxTextureCubeSize = 0;
     uint32_t maxTextureLayers = 0;
     uint32_t maxTextureSamples = 1;
-    uint32_t maxTargets = 0;              ///< colour textures of one Target
+    uint32_t maxTargets = 0;  ///< colour textures of one Target
     uint32_t maxGroupSizeX = 0, maxGroupSizeY = 0, maxGroupSizeZ = 0;
     uint32_t maxGroupThreads = 0;
     uint32_t maxGroupCountX = 0, maxGroupCountY = 0, maxGroupCountZ = 0;
-    uint32_t groupMemory = 0;             ///< bytes of shared memory of a group
-    uint32_t maxPushSize = 0;             ///< bytes of push constants
+    uint32_t groupMemory = 0;  ///< bytes of shared memory of a group
+    uint32_t maxPushSize = 0;  ///< bytes of push constants
     uint32_t maxAnisotropy = 1;
-    uint64_t maxUniformSize = 0;          ///< bytes of one uniform binding
-    uint64_t maxStorageSize = 0;          ///< bytes of one storage binding
+    uint64_t maxUniformSize = 0;  ///< bytes of one uniform binding
+    uint64_t maxStorageSize = 0;  ///< bytes of one storage binding
     uint64_t maxBufferSize = 0;
     uint64_t maxTracingInstances = 0;
     uint64_t maxTracingPrimitives = 0;
-    uint64_t videoMemory = 0;             ///< bytes of device-local memory
-    uint32_t uniformAlignment = 1;        ///< of offsets into uniform buffers, bytes
+    uint64_t videoMemory = 0;       ///< bytes of device-local memory
+    uint32_t uniformAlignment = 1;  ///< of offsets into uniform buffers, bytes
     uint32_t storageAlignment = 1;
     uint32_t texelAlignment = 1;
-    uint32_t scratchAlignment = 1;        ///< of scratch memory for builds, bytes
-    double timestampPeriod = 0.0;         ///< nanoseconds of one tick
+    uint32_t scratchAlignment = 1;  ///< of scratch memory for builds, bytes
+    double timestampPeriod = 0.0;   ///< nanoseconds of one tick
 };
 
 /// Which adapter it is.
@@ -99,7 +99,7 @@ struct DeviceInfo {
     uint32_t index = 0;   ///< in Device::adapters()
     uint32_t vendor_id = 0;
     uint32_t device_id = 0;
-    bool cpu = false;     ///< runs on the CPU
+    bool cpu = false;          ///< runs on the CPU
     FeatureMask features = 0;  ///< all that the adapter offers
 };
 

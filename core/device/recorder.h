@@ -73,8 +73,8 @@ public:
     /// Closes the list. Further recording fails with "recorder.ended".
     Status end();
 
-    /// Uploads `data` inline as uniform block of the slot. Its size must be that of the block, rounded up to 16 bytes or
-    /// not ("bind.uniform_size").
+    /// Uploads `data` inline as uniform block of the slot. Its size must be that of the block, rounded up to 16 bytes
+    /// or not ("bind.uniform_size").
     template <class T>
         requires std::is_trivially_copyable_v<T>
     void setUniform(Slot slot, const T& data) {
@@ -110,7 +110,8 @@ public:
     /// Ends what useBuffer began, for all buffers.
     void clearUses();
 
-    /// With false the caller looks after hazards with barrier() from here on; layouts of textures are still taken care of.
+    /// With false the caller looks after hazards with barrier() from here on; layouts of textures are still taken care
+    /// of.
     void setTracking(bool enabled);
     /// Orders everything before it before everything after it. With tracking on it is accepted and does nothing.
     void barrier(Where where = Where::current());
@@ -122,7 +123,8 @@ public:
     void beginQuery(const Query& query, Where where = Where::current());
     void endQuery(const Query& query, Where where = Where::current());
 
-    /// Names the work that follows, in debuggers and in messages. Regions nest and must be balanced ("recorder.region").
+    /// Names the work that follows, in debuggers and in messages. Regions nest and must be balanced
+    /// ("recorder.region").
     void pushRegion(std::string_view name, Where where = Where::current());
     void popRegion(Where where = Where::current());
 

@@ -26,9 +26,9 @@ struct SamplerDesc {
     float lod_minimum = 0.0f;
     float lod_maximum = 1000.0f;
     float lod_bias = 0.0f;
-    bool comparing = false;                                    ///< a shadow sampler
+    bool comparing = false;  ///< a shadow sampler
     Compare compare = Compare::LessEqual;
-    Color border = {0.0f, 0.0f, 0.0f, 0.0f};                   ///< transparent black, opaque black or opaque white
+    Color border = {0.0f, 0.0f, 0.0f, 0.0f};  ///< transparent black, opaque black or opaque white
 };
 
 }  // namespace glint

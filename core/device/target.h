@@ -27,9 +27,11 @@ public:
     explicit Target(detail::Object* object) : Handle(object) {}
 
     /// One mip level of the texture, which needs FlagTarget; a null texture removes it. Errors: "target.texture".
-    void setColorTexture(uint32_t index, const Texture& texture, const Slice& slice = {}, Where where = Where::current());
+    void setColorTexture(uint32_t index, const Texture& texture, const Slice& slice = {},
+                         Where where = Where::current());
     /// Multisampled colour `index` is averaged into this texture at the end.
-    void setColorResolve(uint32_t index, const Texture& texture, const Slice& slice = {}, Where where = Where::current());
+    void setColorResolve(uint32_t index, const Texture& texture, const Slice& slice = {},
+                         Where where = Where::current());
     void setDepthTexture(const Texture& texture, const Slice& slice = {}, Where where = Where::current());
 
     void setColorOperation(uint32_t index, uint8_t operation);

@@ -16,9 +16,9 @@ public:
     /// What the texture is used for besides being sampled and copied, which is always possible.
     enum Flag : uint32_t {
         FlagNone = 0,
-        FlagTarget = 1u << 0,         ///< colour or depth texture of a Target
-        FlagSurface = 1u << 1,        ///< image load and store in shaders
-        FlagMipmaps = 1u << 2,        ///< a full chain of mip levels
+        FlagTarget = 1u << 0,   ///< colour or depth texture of a Target
+        FlagSurface = 1u << 1,  ///< image load and store in shaders
+        FlagMipmaps = 1u << 2,  ///< a full chain of mip levels
         FlagMultisample2 = 1u << 3,
         FlagMultisample4 = 1u << 4,
         FlagMultisample8 = 1u << 5,

@@ -18,8 +18,8 @@ public:
 
     enum Flag : uint32_t {
         FlagNone = 0,
-        FlagUpdate = 1u << 0,       ///< can be updated (refitted) after vertices have moved
-        FlagCompact = 1u << 1,      ///< can be compacted
+        FlagUpdate = 1u << 0,   ///< can be updated (refitted) after vertices have moved
+        FlagCompact = 1u << 1,  ///< can be compacted
         FlagFastBuild = 1u << 2,
         FlagFastTrace = 1u << 3,
         FlagTransparent = 1u << 4,  ///< geometries are not opaque: queries see candidates
@@ -36,11 +36,11 @@ public:
     /// One instance of a top-level structure.
     struct Instance {
         float transform[12] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  ///< row-major 3x4, object to world
-        const Tracing* tracing = nullptr;                           ///< a null pointer is an instance that is never hit
-        uint32_t data = 0;    ///< custom index, 24 bits
-        uint32_t mask = 0xff; ///< 8 bits, tested against the ray's mask
-        uint32_t offset = 0;  ///< shader binding table record, 24 bits
-        uint32_t flags = 0;   ///< InstanceFlag
+        const Tracing* tracing = nullptr;  ///< a null pointer is an instance that is never hit
+        uint32_t data = 0;                 ///< custom index, 24 bits
+        uint32_t mask = 0xff;              ///< 8 bits, tested against the ray's mask
+        uint32_t offset = 0;               ///< shader binding table record, 24 bits
+        uint32_t flags = 0;                ///< InstanceFlag
     };
 
     Tracing() = default;
@@ -60,8 +60,7 @@ public:
     void setInstances(uint32_t instances, std::source_location where = std::source_location::current());
 
     /// Sizes and allocates the structure. Errors: "tracing.*".
-    Status create(Type type, Flags flags = FlagFastTrace,
-                  std::source_location where = std::source_location::current());
+    Status create(Type type, Flags flags = FlagFastTrace, std::source_location where = std::source_location::current());
 
     Type getType() const;
     uint32_t getGeometries() const;

@@ -33,9 +33,9 @@ struct Native {
 };
 
 struct NativeBuffer : Native {
-    void* mapped = nullptr;       ///< host address if the memory is host-visible and coherent, else nullptr
-    uint64_t address = 0;         ///< device address if asked for
-    uint64_t memory = 0;          ///< bytes allocated
+    void* mapped = nullptr;  ///< host address if the memory is host-visible and coherent, else nullptr
+    uint64_t address = 0;    ///< device address if asked for
+    uint64_t memory = 0;     ///< bytes allocated
 };
 
 struct NativeTexture : Native {
@@ -48,29 +48,29 @@ struct NativePipeline : Native {};
 struct NativeQuery : Native {};
 
 struct NativeTracing : Native {
-    uint64_t memory = 0;          ///< bytes of the structure
-    uint64_t build_size = 0;      ///< scratch bytes, alignment included
+    uint64_t memory = 0;      ///< bytes of the structure
+    uint64_t build_size = 0;  ///< scratch bytes, alignment included
     uint64_t update_size = 0;
-    uint64_t address = 0;         ///< what an instance record refers to
+    uint64_t address = 0;  ///< what an instance record refers to
 };
 
 struct NativeBufferDesc {
     uint64_t size = 0;
     Buffer::Flags flags = 0;
-    bool staging = false;         ///< host memory for uploads
-    bool readback = false;        ///< host memory for reads, cached
+    bool staging = false;   ///< host memory for uploads
+    bool readback = false;  ///< host memory for reads, cached
     std::string name;
 };
 
 struct NativeTextureDesc {
-    TextureDesc desc;             ///< mipmaps resolved; layers counts faces of cubes
+    TextureDesc desc;  ///< mipmaps resolved; layers counts faces of cubes
     uint32_t samples = 1;
     std::string name;
 };
 
 struct SpecializationValue {
     uint32_t id = 0;
-    uint32_t value = 0;           ///< bit pattern
+    uint32_t value = 0;  ///< bit pattern
 };
 
 struct StageDesc {
@@ -92,10 +92,29 @@ enum class CullMode : uint8_t { None, Back, Front };
 enum class FrontMode : uint8_t { CounterClockwise, Clockwise };
 enum class BlendOperation : uint8_t { Add, Subtract, ReverseSubtract, Minimum, Maximum };
 enum class BlendFactor : uint8_t {
-    Zero, One, SourceColor, InvSourceColor, SourceAlpha, InvSourceAlpha, DestinationColor, InvDestinationColor,
-    DestinationAlpha, InvDestinationAlpha, Constant, InvConstant,
+    Zero,
+    One,
+    SourceColor,
+    InvSourceColor,
+    SourceAlpha,
+    InvSourceAlpha,
+    DestinationColor,
+    InvDestinationColor,
+    DestinationAlpha,
+    InvDestinationAlpha,
+    Constant,
+    InvConstant,
 };
-enum class StencilOperation : uint8_t { Keep, Zero, Replace, Invert, IncrementWrap, DecrementWrap, Increment, Decrement };
+enum class StencilOperation : uint8_t {
+    Keep,
+    Zero,
+    Replace,
+    Invert,
+    IncrementWrap,
+    DecrementWrap,
+    Increment,
+    Decrement
+};
 
 struct VertexAttribute {
     uint32_t location = 0;
@@ -106,7 +125,7 @@ struct VertexAttribute {
 
 struct VertexBuffer {
     uint32_t stride = 0;
-    uint32_t rate = 0;            ///< 0: a vertex, 1: an instance
+    uint32_t rate = 0;  ///< 0: a vertex, 1: an instance
 };
 
 struct BlendDesc {
@@ -146,7 +165,7 @@ struct PipelineDesc {
     StencilFace stencil_front, stencil_back;
     uint8_t stencil_read_mask = 0xff, stencil_write_mask = 0xff;
     std::vector<Format> color_formats;
-    std::vector<BlendDesc> blends;          ///< one for each colour format
+    std::vector<BlendDesc> blends;  ///< one for each colour format
     Format depth_format = FormatUnknown;
     uint32_t samples = 1;
     bool alpha_to_coverage = false;
@@ -158,7 +177,7 @@ struct TracingGeometry {
     Format vertex_format = FormatUnknown;
     uint32_t vertex_stride = 0;
     uint64_t vertex_offset = 0;
-    Object* vertex_buffer = nullptr;        ///< the Tracing object holds the references
+    Object* vertex_buffer = nullptr;  ///< the Tracing object holds the references
     uint32_t indices = 0;
     Format index_format = FormatUnknown;
     uint64_t index_offset = 0;
@@ -188,13 +207,13 @@ struct TimelinePoint {
 struct Submission {
     Queue queue = Queue::Main;
     std::span<const ResolvedList> lists;
-    std::span<const TimelinePoint> waits;   ///< before the first command
+    std::span<const TimelinePoint> waits;  ///< before the first command
     uint64_t value = 0;
 };
 
 /// What createDevice needs.
 struct BackendDesc {
-    std::string adapter;                    ///< index, part of a name, or empty for the best
+    std::string adapter;  ///< index, part of a name, or empty for the best
     FeatureMask required = 0;
     FeatureMask optional = 0;
     bool validation = false;
@@ -202,9 +221,9 @@ struct BackendDesc {
 };
 
 struct MemoryUse {
-    uint64_t bytes = 0;                     ///< device memory allocated
+    uint64_t bytes = 0;  ///< device memory allocated
     uint64_t allocations = 0;
-    uint64_t objects_created = 0;           ///< native objects created so far
+    uint64_t objects_created = 0;  ///< native objects created so far
 };
 
 class Backend {

@@ -25,13 +25,13 @@ enum class Stage : uint8_t {
     VertexInput,   ///< vertex and index buffers
     VertexShader,  ///< all shader stages before rasterisation, task and mesh shaders
     Fragment,
-    ColorTarget,   ///< colour attachments and resolves
-    DepthTarget,   ///< depth and stencil attachments
+    ColorTarget,  ///< colour attachments and resolves
+    DepthTarget,  ///< depth and stencil attachments
     Compute,
     RayTracing,
-    Copy,          ///< copies, clears, mipmaps
-    Build,         ///< acceleration structures: builds, copies, size queries
-    Host,          ///< reads by the CPU after a wait
+    Copy,   ///< copies, clears, mipmaps
+    Build,  ///< acceleration structures: builds, copies, size queries
+    Host,   ///< reads by the CPU after a wait
     Count,
 };
 constexpr size_t stage_count = static_cast<size_t>(Stage::Count);
@@ -49,15 +49,15 @@ enum AccessFlag : uint8_t {
 };
 
 enum class Layout : uint8_t {
-    Undefined,    ///< contents are lost at the next transition
-    General,      ///< storage image
+    Undefined,  ///< contents are lost at the next transition
+    General,    ///< storage image
     Sampled,
     ColorTarget,
     DepthTarget,
     CopySource,
     CopyDestination,
     Present,
-    None,         ///< the resource is not a texture
+    None,  ///< the resource is not a texture
 };
 
 /// One access of a command to a resource. For textures the slice is resolved: counts are never 0.
@@ -70,27 +70,43 @@ struct Access {
 };
 
 enum class CommandType : uint8_t {
-    Dispatch, DispatchIndirect,
-    BeginTarget, EndTarget, Draw, DrawIndexed, DrawIndirect, DrawIndexedIndirect,
-    CopyInline,        ///< inline data to a buffer
-    CopyBuffer, FillBuffer,
-    CopyBufferToTexture, CopyTextureToBuffer, CopyTexture, ClearTexture, BlitMipmap,
-    BuildTracings, CopyTracing, WriteTracingSize,
-    BeginQuery, EndQuery,
-    PushRegion, PopRegion,
-    Barrier,           ///< explicit full barrier, in untracked sections
+    Dispatch,
+    DispatchIndirect,
+    BeginTarget,
+    EndTarget,
+    Draw,
+    DrawIndexed,
+    DrawIndirect,
+    DrawIndexedIndirect,
+    CopyInline,  ///< inline data to a buffer
+    CopyBuffer,
+    FillBuffer,
+    CopyBufferToTexture,
+    CopyTextureToBuffer,
+    CopyTexture,
+    ClearTexture,
+    BlitMipmap,
+    BuildTracings,
+    CopyTracing,
+    WriteTracingSize,
+    BeginQuery,
+    EndQuery,
+    PushRegion,
+    PopRegion,
+    HostRead,  ///< does nothing; its accesses make writes visible to the CPU
+    Barrier,   ///< explicit full barrier, in untracked sections
     Count,
 };
 
 /// What every command starts with. `size` is the whole command's bytes, a multiple of 8.
 struct CommandHeader {
     CommandType type = CommandType::Barrier;
-    bool untracked = false;      ///< the caller looks after hazards; layout transitions still happen
+    bool untracked = false;  ///< the caller looks after hazards; layout transitions still happen
     uint16_t padding = 0;
     uint32_t size = 0;
-    uint32_t first_access = 0;   ///< range of CommandList::accesses
+    uint32_t first_access = 0;  ///< range of CommandList::accesses
     uint32_t access_count = 0;
-    uint32_t first_shared = 0;   ///< a second range: that of the bindings, shared by commands with the same bindings
+    uint32_t first_shared = 0;  ///< a second range: that of the bindings, shared by commands with the same bindings
     uint32_t shared_count = 0;
 };
 
@@ -98,24 +114,24 @@ constexpr uint32_t none = 0xffffffffu;
 
 /// One element of a binding block, in the order of BindingLayout::resources, `count` elements each.
 struct BoundResource {
-    uint32_t resource = none;     ///< index into CommandList::resources; none for an inline uniform
-    uint32_t second = none;       ///< sampler of a combined image and sampler
-    uint64_t offset = 0;          ///< bytes into the buffer. Uniforms: 0, theirs is dynamic (below)
-    uint64_t size = 0;            ///< bytes
-    Slice slice;                  ///< textures, resolved
+    uint32_t resource = none;       ///< index into CommandList::resources; none for an inline uniform
+    uint32_t second = none;         ///< sampler of a combined image and sampler
+    uint64_t offset = 0;            ///< bytes into the buffer. Uniforms: 0, theirs is dynamic (below)
+    uint64_t size = 0;              ///< bytes
+    Slice slice;                    ///< textures, resolved
     Format format = FormatUnknown;  ///< texel buffers
 };
 
 /// The bindings of a dispatch or draw. Commands recorded with unchanged resources share `bound`, so that a back end
 /// that sees the same offset again can keep its descriptors.
 struct Bindings {
-    uint32_t bound = none;        ///< byte offset in CommandList::bytes of the array of BoundResource, none if empty
+    uint32_t bound = none;  ///< byte offset in CommandList::bytes of the array of BoundResource, none if empty
     uint32_t bound_count = 0;
     /// Byte offset in CommandList::bytes of one uint32_t for each uniform element in layout order: its offset into the
     /// inline data if the element's resource is none, else into its buffer.
     uint32_t uniform_offsets = none;
     uint32_t uniform_count = 0;
-    uint32_t push = none;         ///< byte offset in CommandList::bytes of the push constants
+    uint32_t push = none;  ///< byte offset in CommandList::bytes of the push constants
     uint32_t push_size = 0;
 };
 
@@ -140,11 +156,11 @@ enum class StoreOperation : uint8_t { Store, Discard };
 struct Attachment {
     uint32_t texture = none;
     uint32_t resolve = none;
-    Slice slice;           ///< one mip level, one or more layers
+    Slice slice;  ///< one mip level, one or more layers
     Slice resolve_slice;
     LoadOperation load = LoadOperation::Clear;
     StoreOperation store = StoreOperation::Store;
-    float clear[4] = {0, 0, 0, 0};   ///< colour; depth in [0]
+    float clear[4] = {0, 0, 0, 0};  ///< colour; depth in [0]
     uint32_t clear_stencil = 0;
 };
 
@@ -183,12 +199,12 @@ struct Scissor {
 struct DrawState {
     uint32_t pipeline = 0;
     Bindings bindings;
-    uint32_t vertices = none;       ///< byte offset in CommandList::bytes of the array of VertexBinding
-    uint32_t vertex_count = 0;      ///< vertex buffers
+    uint32_t vertices = none;   ///< byte offset in CommandList::bytes of the array of VertexBinding
+    uint32_t vertex_count = 0;  ///< vertex buffers
     uint32_t index_buffer = none;
-    uint32_t index_size = 0;        ///< bytes of an index: 2 or 4
+    uint32_t index_size = 0;  ///< bytes of an index: 2 or 4
     uint64_t index_offset = 0;
-    uint32_t dynamic = none;        ///< byte offset of a DynamicState; commands with unchanged state share it
+    uint32_t dynamic = none;  ///< byte offset of a DynamicState; commands with unchanged state share it
 };
 
 struct DynamicState {
@@ -199,17 +215,17 @@ struct DynamicState {
 };
 
 struct DrawCommand {
-    CommandHeader header;   ///< Draw: vertices; DrawIndexed: indices
+    CommandHeader header;  ///< Draw: vertices; DrawIndexed: indices
     DrawState state;
     uint32_t count = 0;
     uint32_t instances = 1;
-    uint32_t first = 0;     ///< vertex or index
+    uint32_t first = 0;  ///< vertex or index
     int32_t base_vertex = 0;
     uint32_t first_instance = 0;
 };
 
 struct DrawIndirectCommand {
-    CommandHeader header;   ///< DrawIndirect or DrawIndexedIndirect
+    CommandHeader header;  ///< DrawIndirect or DrawIndexedIndirect
     DrawState state;
     uint32_t buffer = 0;
     uint64_t offset = 0;
@@ -221,7 +237,7 @@ struct CopyInlineCommand {
     CommandHeader header;
     uint32_t buffer = 0;
     uint64_t offset = 0;
-    uint32_t data = 0;      ///< offset into the inline data
+    uint32_t data = 0;  ///< offset into the inline data
     uint64_t size = 0;
 };
 
@@ -238,7 +254,7 @@ struct FillBufferCommand {
     CommandHeader header;
     uint32_t buffer = 0;
     uint32_t value = 0;
-    uint64_t offset = 0;    ///< multiples of 4
+    uint64_t offset = 0;  ///< multiples of 4
     uint64_t size = 0;
 };
 
@@ -249,7 +265,7 @@ struct CopyBufferTextureCommand {
     uint32_t texture = 0;
     uint64_t offset = 0;
     Slice slice;
-    Region region;          ///< resolved
+    Region region;  ///< resolved
 };
 
 struct CopyTextureCommand {
@@ -258,7 +274,7 @@ struct CopyTextureCommand {
     uint32_t destination = 0;
     Slice source_slice;
     Slice destination_slice;
-    Region source_region;   ///< resolved
+    Region source_region;  ///< resolved
     uint32_t x = 0, y = 0, z = 0;
 };
 
@@ -269,7 +285,7 @@ struct ClearTextureCommand {
     union {
         float f[4];
         uint32_t u[4];
-    } value = {};           ///< by the format's type; depth in f[0], stencil in u[1]
+    } value = {};  ///< by the format's type; depth in f[0], stencil in u[1]
 };
 
 /// Fills `slice.mip` from the level below it, `slice.layers` layers, linear filter.
@@ -283,9 +299,9 @@ struct BlitMipmapCommand {
 struct TracingBuild {
     uint32_t tracing = 0;
     bool update = false;
-    uint32_t scratch = 0;           ///< buffer
+    uint32_t scratch = 0;  ///< buffer
     uint64_t scratch_offset = 0;
-    uint32_t instances = none;      ///< buffer of native instance records
+    uint32_t instances = none;  ///< buffer of native instance records
     uint64_t instances_offset = 0;
     uint32_t instance_count = 0;
 };
@@ -293,7 +309,7 @@ struct TracingBuild {
 /// Builds that may run side by side: their scratch ranges are apart and none refers to another.
 struct BuildTracingsCommand {
     CommandHeader header;
-    uint32_t builds = 0;            ///< byte offset in CommandList::bytes of an array of TracingBuild
+    uint32_t builds = 0;  ///< byte offset in CommandList::bytes of an array of TracingBuild
     uint32_t count = 0;
 };
 
@@ -317,7 +333,11 @@ struct QueryCommand {
 
 struct RegionCommand {
     CommandHeader header;
-    uint32_t name = 0;      ///< byte offset in CommandList::bytes of a zero-terminated string
+    uint32_t name = 0;  ///< byte offset in CommandList::bytes of a zero-terminated string
+};
+
+struct HostReadCommand {
+    CommandHeader header;
 };
 
 struct BarrierCommand {
@@ -326,14 +346,14 @@ struct BarrierCommand {
 
 /// A closed list is constant until it is recycled. Buffers keep their capacity, so that a warm frame allocates nothing.
 struct CommandList {
-    std::vector<std::byte> bytes;         ///< command payloads that commands point into: bindings, names
-    std::vector<std::byte> commands;      ///< commands one after the other, each a multiple of 8 bytes
+    std::vector<std::byte> bytes;     ///< command payloads that commands point into: bindings, names
+    std::vector<std::byte> commands;  ///< commands one after the other, each a multiple of 8 bytes
     std::vector<Access> accesses;
-    std::vector<Object*> resources;       ///< one reference held for each
-    std::vector<std::byte> inline_data;   ///< uploaded at submit, to an address aligned to 256 bytes
+    std::vector<Object*> resources;      ///< one reference held for each
+    std::vector<std::byte> inline_data;  ///< uploaded at submit, to an address aligned to 256 bytes
     uint32_t command_count = 0;
     uint32_t region_depth = 0;
-    std::string label;                    ///< of the recorder, for debuggers and lost-device messages
+    std::string label;  ///< of the recorder, for debuggers and lost-device messages
     Error error;
 
     template <class T>
@@ -359,18 +379,18 @@ struct ImageBarrier {
     Slice slice;
     Layout from = Layout::Undefined;
     Layout to = Layout::Undefined;
-    StageMask source = 0;        ///< 0: nothing to wait for; stage_all: after the semaphore waits of the submission
+    StageMask source = 0;  ///< 0: nothing to wait for; stage_all: after the semaphore waits of the submission
     StageMask destination = 0;
 };
 
 /// What has to happen before a command: one memory barrier over everything and any number of image transitions.
 struct Barrier {
-    uint32_t command = 0;        ///< index of the command it precedes; command_count for the end of the list
-    StageMask source = 0;        ///< both 0: no memory barrier
+    uint32_t command = 0;  ///< index of the command it precedes; command_count for the end of the list
+    StageMask source = 0;  ///< both 0: no memory barrier
     StageMask destination = 0;
-    uint32_t first_image = 0;    ///< range of ResolvedList::images
+    uint32_t first_image = 0;  ///< range of ResolvedList::images
     uint32_t image_count = 0;
-    bool split = false;          ///< within a target: end it (storing), apply the barrier, begin it again (loading)
+    bool split = false;  ///< within a target: end it (storing), apply the barrier, begin it again (loading)
 };
 
 /// A list and the barriers the tracker found for it, in order of commands (at most one Barrier a command).

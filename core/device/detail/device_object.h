@@ -25,7 +25,7 @@ public:
 
     Status open(const DeviceDesc& desc, Where where);
     /// Takes a back end that exists already: foreign handles.
-    Status adopt(std::unique_ptr<Backend> backend, MessageCallback message);
+    void adopt(std::unique_ptr<Backend> made, MessageCallback message);
 
     const Features& features() const { return backend->features(); }
     const DeviceInfo& info() const { return backend->info(); }
@@ -41,16 +41,18 @@ public:
     void collect();
 
     /// A recorder from the pool, empty.
-    RecorderPtr acquireRecorder(Queue queue, std::string_view name, Where where);
+    RecorderPtr acquireRecorder(Queue queue, std::string_view name);
     void recycleRecorder(RecorderCore* core);
 
     /// Runs `record(RecorderCore&)` on the list of queued transfers.
     template <class Record>
     void transfer(Record&& record) {
         std::lock_guard lock(transfer_mutex_);
-        if (!transfers_) transfers_ = acquireRecorder(Queue::Main, "transfers", Where::current());
+        if (!transfers_) transfers_ = takeRecorder(Queue::Main, "transfers");
         record(*transfers_);
     }
+    /// Writes to a buffer without the GPU if its memory is host-visible and nothing submitted or queued uses it.
+    bool writeDirectly(BufferObject& buffer, uint64_t offset, const void* data, uint64_t size);
 
     Status submit(std::span<RecorderCore* const> recorders, FenceObject* fence, Where where);
     Status flush(Where where) { return submit({}, nullptr, where); }
@@ -58,9 +60,20 @@ public:
     Status waitIdle(Where where);
     Status wait(const std::array<uint64_t, queue_count>& values, uint64_t nanoseconds, Where where);
     bool isDone(const std::array<uint64_t, queue_count>& values);
+    bool isLost();
 
     /// Host-visible memory for an upload or a read-back; kept alive by the list that uses it.
     Expected<Ref<BufferObject>> createStaging(uint64_t size, bool readback, Where where);
+
+    /// Scratch memory shared by the builds that bring none: one buffer, which grows. Builds with it run one after
+    /// another.
+    Expected<Ref<BufferObject>> acquireScratch(uint64_t size, Where where);
+
+    /// Plays what `core` holds, then puts compacted copies in the place of the structures. `core` is a fresh one
+    /// afterwards.
+    Status compact(RecorderPtr& core, std::span<TracingObject* const> tracings, Where where);
+    /// Waits for the query's last submission. Errors: "query.unused".
+    Expected<std::array<uint64_t, 7>> queryResult(QueryObject& query, Where where);
 
     std::unique_ptr<Backend> backend;
 
@@ -70,24 +83,29 @@ private:
         std::array<uint64_t, queue_count> last_use;
     };
 
-    Status submitLocked(std::span<RecorderCore* const> recorders, Queue queue, Where where);
+    RecorderCore* takeRecorder(Queue queue, std::string_view name);
+    Status play(Queue queue, Where where);
+    Status failed(Error error, Where where);
 
     MessageCallback message_;
 
-    std::mutex submit_mutex_;                        // of tracker_, next_value_, scratch below, last_use of objects
+    std::mutex submit_mutex_;  // of tracker_, next_value_, scratch below, last_use of objects
     Tracker tracker_;
     std::array<uint64_t, queue_count> next_value_ = {};  // last value submitted
     std::vector<const CommandList*> lists_;
     bool lost_ = false;
 
-    std::mutex transfer_mutex_;                      // of transfers_; taken before submit_mutex_
-    RecorderPtr transfers_;
+    std::mutex transfer_mutex_;          // of transfers_; taken before submit_mutex_
+    RecorderCore* transfers_ = nullptr;  // does not keep the device: it is the device's own
 
     std::mutex retired_mutex_;
     std::vector<Retired> retired_;
 
+    std::mutex scratch_mutex_;
+    Ref<BufferObject> scratch_;
+
     std::mutex recorder_mutex_;
-    std::vector<RecorderCore*> recorders_;           // idle
+    std::vector<RecorderCore*> recorders_;  // idle
 };
 
 }  // namespace glint::detail

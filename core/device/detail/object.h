@@ -22,36 +22,51 @@ namespace glint::detail {
 class DeviceObject;
 
 enum class ObjectType : uint8_t {
-    Device, Buffer, Texture, Sampler, Shader, Kernel, Pipeline, Target, Tracing, Query, Fence,
+    Device,
+    Buffer,
+    Texture,
+    Sampler,
+    Shader,
+    Kernel,
+    Pipeline,
+    Target,
+    Tracing,
+    Query,
+    Fence,
 };
 const char* toString(ObjectType type);
 
 /// State the tracker keeps for a buffer, a tracing or one texture subresource. Guarded by the device's submit lock.
 struct ResourceState {
     struct Reads {
-        uint64_t value = 0;       ///< time-line value of the last submission that read it on this queue
-        uint64_t position = 0;    ///< position of the last read on this queue
-        StageMask stages = 0;     ///< that read it since the last write
+        uint64_t value = 0;     ///< time-line value of the last submission that read it on this queue
+        uint64_t position = 0;  ///< position of the last read on this queue
+        StageMask stages = 0;   ///< that read it since the last write
     };
-    uint64_t write_value = 0;     ///< submission of the last write
+    uint64_t write_value = 0;  ///< submission of the last write
     uint64_t write_position = 0;
-    StageMask write_stages = 0;   ///< 0: never written
-    StageMask visible = 0;        ///< stages that a transition already made the write visible to
+    StageMask write_stages = 0;  ///< 0: never written
+    StageMask visible = 0;       ///< stages that a transition already made the write visible to
     Queue write_queue = Queue::Main;
     Layout layout = Layout::Undefined;
     Reads reads[queue_count];
-    uint64_t epoch = 0;           ///< submission that touched it last, for the undo log
+    uint64_t epoch = 0;  ///< submission that touched it last, for the undo log
 };
 
+/// Counts two kinds of references. Users are handles: while there is one, the object keeps its device alive. Holds are
+/// Glint's own (command lists, structures that refer to others): they keep the object, but not the device, so that what
+/// a device holds itself never keeps it from going.
 class Object {
 public:
-    /// `device` is null for objects that live without one (Device itself, Shader).
+    /// Begins with one user. `device` is null for objects that live without one (Device itself, Shader).
     Object(ObjectType type, DeviceObject* device);
     Object(const Object&) = delete;
     Object& operator=(const Object&) = delete;
 
-    void retain() { references_.fetch_add(1, std::memory_order_relaxed); }
+    void retain();
     void release();
+    void hold() { holds_.fetch_add(1, std::memory_order_relaxed); }
+    void unhold();
 
     ObjectType type() const { return type_; }
     DeviceObject* device() const { return device_; }
@@ -78,7 +93,8 @@ protected:
     virtual void lastRelease() {}
 
 private:
-    std::atomic<uint32_t> references_ = 1;
+    std::atomic<uint32_t> users_ = 1;
+    std::atomic<uint32_t> holds_ = 1;  // one of them for all users together
     std::atomic<ObjectState> state_ = ObjectState::Building;
     const ObjectType type_;
     DeviceObject* const device_;
@@ -87,13 +103,13 @@ private:
     std::string name_;
 };
 
-/// An owning pointer to an object, for Glint's own sources.
+/// Holds an object.
 template <class T>
 class Ref {
 public:
     Ref() = default;
     explicit Ref(T* object) : object_(object) {
-        if (object_) object_->retain();
+        if (object_) object_->hold();
     }
     Ref(const Ref& other) : Ref(other.object_) {}
     Ref(Ref&& other) noexcept : object_(other.object_) { other.object_ = nullptr; }
@@ -102,7 +118,13 @@ public:
         return *this;
     }
     ~Ref() {
-        if (object_) object_->release();
+        if (object_) object_->unhold();
+    }
+    /// Holds a new object and gives up the user it began with.
+    static Ref adopt(T* object) {
+        Ref ref(object);
+        object->release();
+        return ref;
     }
     T* get() const { return object_; }
     T* operator->() const { return object_; }
@@ -129,7 +151,7 @@ public:
     NativeTexture* nativeTexture() const { return static_cast<NativeTexture*>(native.get()); }
     ResourceState& use(uint32_t mip, uint32_t layer) { return uses[layer * desc.mipmaps + mip]; }
 
-    TextureDesc desc;                 ///< mipmaps resolved, layers counts faces
+    TextureDesc desc;  ///< mipmaps resolved, layers counts faces
     uint32_t samples = 1;
     std::vector<ResourceState> uses;  ///< one for each subresource, layer-major
 };
@@ -248,7 +270,7 @@ public:
     NativeQuery* nativeQuery() const { return static_cast<NativeQuery*>(native.get()); }
 
     const Query::Type query_type;
-    ResourceState use;                ///< unused by the tracker; last_use says when a result is there
+    ResourceState use;  ///< unused by the tracker; last_use says when a result is there
 };
 
 class TracingObject final : public Object {
@@ -259,12 +281,14 @@ public:
     Tracing::Type tracing_type = Tracing::TypeTriangle;
     Tracing::Flags flags = 0;
     std::vector<TracingGeometry> geometries;
-    std::vector<Ref<BufferObject>> buffers;        ///< every buffer the geometries name
-    uint32_t instances = 0;                        ///< capacity of a top level
-    uint32_t instance_count = 0;                   ///< set by setTracing
-    std::vector<Ref<TracingObject>> references;    ///< bottom levels the instances refer to, each once
-    Ref<BufferObject> instance_buffer;             ///< native records
-    bool built = false;
+    std::vector<Ref<BufferObject>> buffers;         ///< every buffer the geometries name
+    uint32_t instances = 0;                         ///< capacity of a top level
+    std::vector<Tracing::Instance> instance_data;   ///< set by setTracing; their `tracing` is not used
+    std::vector<TracingObject*> instance_tracings;  ///< what they refer to, or nullptr
+    std::vector<Ref<TracingObject>> references;     ///< the same, each once
+    Ref<BufferObject> instance_buffer;  ///< native records, written when it is built: compaction moves structures
+    bool built = false;                 ///< a build has been recorded
+    bool compacted = false;
     ResourceState use;
 };
 

@@ -5,9 +5,9 @@
 // command (before the target, for draws, unless the conflict is within it). One instance a device, used under the
 // submit lock.
 //
-// Positions count the commands of a queue over its whole life. ordered_[s][d] is the position of the last memory barrier
-// from stage s to stage d, so "is this write ordered before that read?" is one comparison, whatever resource the barrier
-// was placed for.
+// Positions count the commands of a queue over its whole life. ordered_[s][d] is the position of the last memory
+// barrier from stage s to stage d, so "is this write ordered before that read?" is one comparison, whatever resource
+// the barrier was placed for.
 
 #include <glint/device/detail/command_list.h>
 #include <glint/device/detail/object.h>
@@ -15,6 +15,7 @@
 #include <array>
 #include <cstdint>
 #include <span>
+#include <utility>
 #include <vector>
 
 namespace glint::detail {
@@ -43,26 +44,24 @@ private:
         ResourceState* state;
         ResourceState old;
     };
-    /// The barrier that is being collected for one command.
-    struct Pending {
-        StageMask source = 0;
-        StageMask destination = 0;
-        uint32_t first_image = 0;
-        bool needed() const { return source != 0; }
-    };
-
     void resolveList(const CommandList& list);
-    void access(const CommandList& list, const Access& access, bool untracked, bool in_target);
-    void accessState(ResourceState& state, const CommandList& list, const Access& access, const Slice& slice,
-                     bool untracked, bool in_target);
+    void access(const CommandList& list, const Access& access);
+    void accessState(ResourceState& state, const Access& access, const Slice& slice);
+    void endAttachment(const CommandList& list, const Access& access);
     void touch(ResourceState& state);
-    void waitFor(Queue queue, uint64_t value);
-    void need(StageMask source, Stage destination, uint64_t position, bool in_target);
-    bool orderedAfter(StageMask source, Stage destination, uint64_t position) const;
-    void addImage(uint32_t resource, const Slice& slice, Layout from, Layout to, StageMask source, StageMask destination,
-                  bool in_target);
-    void place(uint32_t command);
-    void fullBarrier(uint32_t command);
+
+    /// True if the other queue's value is waited for; false for the queue itself.
+    bool waitFor(Queue queue, uint64_t value);
+    bool isOrdered(StageMask source, Stage destination, uint64_t position) const;
+
+    // The barrier being collected: before the current command or, within a target, before the target or its last split.
+    void openBarrier(uint32_t command, bool is_split);
+    void closeBarrier();
+    void split();
+    void require(StageMask source, StageMask destination);
+    void addTransition(uint32_t resource, const Slice& slice, Layout from, Layout to, StageMask source,
+                       StageMask destination);
+    static bool covers(const Slice& range, const Slice& single);
 
     std::array<QueueState, queue_count> queues_;
     uint64_t epoch_ = 0;
@@ -72,14 +71,16 @@ private:
     QueueState* now_ = nullptr;
     QueueState saved_;
     uint64_t value_ = 0;
-    uint64_t target_position_ = 0;
-    uint32_t target_command_ = 0;
-    Pending pending_;          ///< before the current command
-    Pending target_pending_;   ///< before the current target
-    std::vector<ImageBarrier> target_images_;
-    std::vector<ImageBarrier> command_images_;
+    uint64_t position_ = 0;
+    uint32_t command_ = 0;
+    bool untracked_ = false;
+    bool in_target_ = false;
+    uint32_t barrier_ = 0;
+    uint64_t barrier_position_ = 0;
+    std::vector<ImageBarrier> pending_images_;
     std::vector<Barrier> barriers_;
     std::vector<ImageBarrier> images_;
+    std::vector<std::pair<size_t, size_t>> ranges_;
     std::vector<ResolvedList> resolved_;
     std::vector<TimelinePoint> waits_;
     std::vector<Undo> undo_;

@@ -1,0 +1,299 @@
+#include <glint/device/detail/device_object.h>
+
+#include <glint/base/format_error.h>
+#include <glint/base/log.h>
+#include <glint/device/detail/backends.h>
+#include <glint/device/detail/recorder_core.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <cstring>
+
+namespace glint::detail {
+
+namespace {
+
+/// Scratch memory above this is not kept between builds.
+constexpr uint64_t scratch_limit = 64ull << 20;
+
+bool passed(Backend& backend, const std::array<uint64_t, queue_count>& values) {
+    for (size_t q = 0; q < queue_count; q++)
+        if (values[q] && backend.completed(static_cast<Queue>(q)) < values[q]) return false;
+    return true;
+}
+
+}  // namespace
+
+DeviceObject::~DeviceObject() {
+    if (!backend) return;
+    for (size_t q = 0; q < queue_count; q++) {
+        const TimelinePoint last = {static_cast<Queue>(q), next_value_[q]};
+        if (last.value) (void)backend->wait({&last, 1}, UINT64_MAX);
+    }
+    if (transfers_) recycleRecorder(transfers_);
+    scratch_ = {};
+    for (RecorderCore* recorder : recorders_) delete recorder;
+    // The device is idle or lost: nothing is in use any more. Deleting one may retire others.
+    while (!retired_.empty()) {
+        std::vector<Retired> retired = std::move(retired_);
+        retired_.clear();
+    }
+}
+
+Status DeviceObject::open(const DeviceDesc& desc, Where where) {
+    message_ = desc.message;
+    BackendDesc backend_desc;
+    backend_desc.adapter = desc.adapter;
+    if (const char* adapter = std::getenv("GLINT_ADAPTER"); adapter && desc.adapter.empty())
+        backend_desc.adapter = adapter;
+    backend_desc.required = desc.required;
+    backend_desc.optional = desc.optional;
+#ifdef NDEBUG
+    backend_desc.validation = false;
+#else
+    backend_desc.validation = true;
+#endif
+    if (const char* validation = std::getenv("GLINT_VALIDATION"))
+        backend_desc.validation = std::strcmp(validation, "1") == 0;
+    if (desc.validation != DeviceDesc::Validation::Default)
+        backend_desc.validation = desc.validation == DeviceDesc::Validation::On;
+    backend_desc.message = [this](const Error& error, bool warning) {
+        report(error, warning ? Message::Severity::Warning : Message::Severity::Error);
+    };
+    Expected<std::unique_ptr<Backend>> made = createBackend(desc.api, backend_desc);
+    if (!made) {
+        const Error error = made.error().at(where);
+        report(error);
+        return fail(error);
+    }
+    backend = std::move(*made);
+    setReady();
+    return {};
+}
+
+void DeviceObject::adopt(std::unique_ptr<Backend> made, MessageCallback message) {
+    message_ = std::move(message);
+    backend = std::move(made);
+    setReady();
+}
+
+void DeviceObject::report(const Error& error, Message::Severity severity) const {
+    if (message_) return message_({severity, error});
+    log(severity == Message::Severity::Error ? LogLevel::Error : LogLevel::Warning, error.id(), error.text());
+}
+
+Status DeviceObject::failed(Error error, Where where) {
+    error = error.at(where);
+    report(error);
+    return error;
+}
+
+void DeviceObject::retire(std::unique_ptr<Native> native_object, const std::array<uint64_t, queue_count>& use) {
+    if (passed(*backend, use)) return;  // deletes it
+    std::lock_guard lock(retired_mutex_);
+    retired_.push_back({std::move(native_object), use});
+}
+
+void DeviceObject::replaceNative(Object& object, std::unique_ptr<Native> made) {
+    std::unique_ptr<Native> old;
+    std::array<uint64_t, queue_count> use;
+    {
+        std::lock_guard lock(submit_mutex_);
+        old = std::move(object.native);
+        object.native = std::move(made);
+        use = object.last_use;
+    }
+    if (old) retire(std::move(old), use);
+}
+
+void DeviceObject::collect() {
+    std::vector<Retired> done;
+    {
+        std::lock_guard lock(retired_mutex_);
+        if (retired_.empty()) return;
+        const auto first = std::stable_partition(retired_.begin(), retired_.end(), [&](const Retired& retired) {
+            return !passed(*backend, retired.last_use);
+        });
+        done.assign(std::make_move_iterator(first), std::make_move_iterator(retired_.end()));
+        retired_.erase(first, retired_.end());
+    }
+}
+
+RecorderCore* DeviceObject::takeRecorder(Queue queue, std::string_view name) {
+    RecorderCore* core = nullptr;
+    {
+        std::lock_guard lock(recorder_mutex_);
+        if (!recorders_.empty()) {
+            core = recorders_.back();
+            recorders_.pop_back();
+        }
+    }
+    if (!core) core = new RecorderCore(this);
+    core->begin(queue, name);
+    return core;
+}
+
+RecorderPtr DeviceObject::acquireRecorder(Queue queue, std::string_view name) {
+    RecorderCore* core = takeRecorder(queue, name);
+    core->keep = Ref<DeviceObject>(this);
+    return RecorderPtr(core);
+}
+
+void DeviceObject::recycleRecorder(RecorderCore* core) {
+    core->clear();
+    core->keep = {};
+    std::lock_guard lock(recorder_mutex_);
+    recorders_.push_back(core);
+}
+
+bool DeviceObject::writeDirectly(BufferObject& buffer, uint64_t offset, const void* data, uint64_t size) {
+    void* mapped = buffer.nativeBuffer()->mapped;
+    if (!mapped) return false;
+    std::scoped_lock lock(transfer_mutex_, submit_mutex_);
+    if ((transfers_ && !transfers_->isEmpty()) || !passed(*backend, buffer.last_use)) return false;
+    // Host writes before a submission are visible to it.
+    std::memcpy(static_cast<std::byte*>(mapped) + offset, data, size);
+    return true;
+}
+
+Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObject* fence, Where where) {
+    // Released after the locks: letting go of a list may delete objects.
+    RecorderCore* transfers = nullptr;
+    Status status;
+    {
+        std::scoped_lock lock(transfer_mutex_, submit_mutex_);
+        if (lost_)
+            return failed(makeError(where, ErrorCode::DeviceLost, "device.lost", "submit: the device is lost"), where);
+        const Queue queue = recorders.empty() ? Queue::Main : recorders[0]->queue();
+        Error error;
+        for (RecorderCore* recorder : recorders) {
+            if (recorder->device() != this)
+                error = makeError(where, ErrorCode::InvalidArgument, "handle.device",
+                                  "submit: the recorder '{}' belongs to another device", recorder->list().label);
+            else if (recorder->submitted)
+                error = makeError(where, ErrorCode::InvalidArgument, "submit.twice",
+                                  "submit: the recorder '{}' has been submitted already", recorder->list().label);
+            else if (recorder->queue() != queue)
+                error = makeError(where, ErrorCode::InvalidArgument, "submit.queue",
+                                  "submit: recorders of different queues in one call");
+            if (error) return failed(error, where);
+        }
+        transfers = std::exchange(transfers_, nullptr);
+        if (transfers) error = transfers->end(where).error();
+        for (RecorderCore* recorder : recorders) {
+            const Status ended = recorder->end(where);
+            if (!ended && !error) error = ended.error();
+            recorder->submitted = true;
+        }
+        if (error) {
+            status = error;  // reported when it happened
+        } else {
+            lists_.clear();
+            if (transfers && !transfers->isEmpty()) lists_.push_back(&transfers->list());
+            if (!lists_.empty() && queue != Queue::Main) {
+                status = play(Queue::Main, where);
+                lists_.clear();
+            }
+            if (status) {
+                for (RecorderCore* recorder : recorders)
+                    if (!recorder->isEmpty()) lists_.push_back(&recorder->list());
+                if (!lists_.empty()) status = play(queue, where);
+            }
+            if (status && fence) {
+                std::lock_guard fence_lock(fence->mutex);
+                fence->values = {};
+                fence->values[static_cast<size_t>(queue)] = next_value_[static_cast<size_t>(queue)];
+                fence->values[static_cast<size_t>(Queue::Main)] = next_value_[static_cast<size_t>(Queue::Main)];
+            }
+        }
+    }
+    if (transfers) recycleRecorder(transfers);
+    for (RecorderCore* recorder : recorders) recorder->clear();
+    collect();
+    return status;
+}
+
+Status DeviceObject::play(Queue queue, Where where) {
+    uint64_t& next = next_value_[static_cast<size_t>(queue)];
+    const uint64_t value = next + 1;
+    tracker_.resolve(queue, value, lists_);
+    const Submission submission = {queue, tracker_.lists(), tracker_.waits(), value};
+    if (Status status = backend->submit(submission); !status) {
+        tracker_.rollback();
+        lost_ = lost_ || status.error().code() == ErrorCode::DeviceLost;
+        return failed(status.error(), where);
+    }
+    next = value;
+    for (const CommandList* list : lists_)
+        for (Object* object : list->resources) object->last_use[static_cast<size_t>(queue)] = value;
+    return {};
+}
+
+Status DeviceObject::waitIdle(Where where) {
+    std::array<uint64_t, queue_count> values;
+    {
+        std::lock_guard lock(submit_mutex_);
+        values = next_value_;
+    }
+    return wait(values, UINT64_MAX, where);
+}
+
+Status DeviceObject::wait(const std::array<uint64_t, queue_count>& values, uint64_t nanoseconds, Where where) {
+    std::array<TimelinePoint, queue_count> points;
+    size_t count = 0;
+    for (size_t q = 0; q < queue_count; q++)
+        if (values[q]) points[count++] = {static_cast<Queue>(q), values[q]};
+    if (count == 0) return {};
+    const Status status = backend->wait({points.data(), count}, nanoseconds);
+    if (!status) {
+        if (status.error().code() == ErrorCode::DeviceLost) {
+            std::lock_guard lock(submit_mutex_);
+            lost_ = true;
+        }
+        return failed(status.error(), where);
+    }
+    collect();
+    return {};
+}
+
+bool DeviceObject::isDone(const std::array<uint64_t, queue_count>& values) { return passed(*backend, values); }
+
+bool DeviceObject::isLost() {
+    std::lock_guard lock(submit_mutex_);
+    return lost_;
+}
+
+Expected<Ref<BufferObject>> DeviceObject::createStaging(uint64_t size, bool readback, Where where) {
+    NativeBufferDesc desc;
+    desc.size = size;
+    desc.staging = !readback;
+    desc.readback = readback;
+    desc.name = readback ? "read-back" : "staging";
+    Expected<std::unique_ptr<NativeBuffer>> made = backend->createBuffer(desc);
+    if (!made) return unexpected(made.error().at(where));
+    auto staging = Ref<BufferObject>::adopt(new BufferObject(this));
+    staging->size = size;
+    staging->native = std::move(*made);
+    staging->setReady();
+    return staging;
+}
+
+Expected<Ref<BufferObject>> DeviceObject::acquireScratch(uint64_t size, Where where) {
+    std::lock_guard lock(scratch_mutex_);
+    if (scratch_ && scratch_->size >= size) return scratch_;
+    NativeBufferDesc desc;
+    desc.size = std::max<uint64_t>(size, 1);
+    desc.flags = Buffer::FlagScratch;
+    desc.name = "scratch";
+    Expected<std::unique_ptr<NativeBuffer>> made = backend->createBuffer(desc);
+    if (!made) return unexpected(made.error().at(where));
+    auto scratch = Ref<BufferObject>::adopt(new BufferObject(this));
+    scratch->size = desc.size;
+    scratch->flags = Buffer::FlagScratch;
+    scratch->native = std::move(*made);
+    scratch->setReady();
+    if (size <= scratch_limit) scratch_ = scratch;
+    return scratch;
+}
+
+}  // namespace glint::detail

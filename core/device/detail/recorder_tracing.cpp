@@ -1,0 +1,171 @@
+#include <glint/device/detail/recorder_core.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace glint::detail {
+
+void RecorderCore::setInstances(const Tracing& tracing, std::span<const Tracing::Instance> instances, Where where) {
+    if (!recording(where) || !usable(tracing, "setTracing", where)) return;
+    auto* object = static_cast<TracingObject*>(tracing.object());
+    if (object->tracing_type != Tracing::TypeInstance)
+        return fail(where, ErrorCode::InvalidArgument, "tracing.type", "setTracing: {} is no top-level structure",
+                    object->label());
+    if (instances.size() > object->instances)
+        return fail(where, ErrorCode::OutOfRange, "tracing.instances", "setTracing: {} instances, {} has room for {}",
+                    instances.size(), object->label(), object->instances);
+
+    object->instance_tracings.clear();
+    // References are sorted to hold each once; the last one is remembered, as neighbours mostly share it.
+    references_.clear();
+    for (size_t i = 0; i < instances.size(); i++) {
+        const Tracing::Instance& instance = instances[i];
+        const auto complain = [&](const char* id, const std::string& text) {
+            fail(where, ErrorCode::InvalidArgument, id, "setTracing: instance {} of {} {}", i, object->label(), text);
+        };
+        if (instance.data >> 24 || instance.offset >> 24 || instance.mask > 0xff)
+            return complain("tracing.instance_bits",
+                            fmt::format("has data {:#x}, offset {:#x}, mask {:#x}; the limits are 24, 24 and 8 bits",
+                                        instance.data, instance.offset, instance.mask));
+        if (!std::all_of(std::begin(instance.transform), std::end(instance.transform),
+                         [](float value) { return std::isfinite(value); }))
+            return complain("tracing.instance_transform", "has a transform that is not finite");
+        if (!instance.tracing || instance.tracing->state() == ObjectState::Null) {
+            object->instance_tracings.push_back(nullptr);
+            continue;
+        }
+        auto* bottom = static_cast<TracingObject*>(instance.tracing->object());
+        if (instance.tracing->state() != ObjectState::Ready || bottom->device() != device_)
+            return complain("tracing.instance_failed",
+                            fmt::format("refers to {}, which is not usable", bottom->label()));
+        if (bottom->tracing_type == Tracing::TypeInstance)
+            return complain("tracing.instance_type",
+                            fmt::format("refers to {}, a top-level structure", bottom->label()));
+        object->instance_tracings.push_back(bottom);
+        if (references_.empty() || references_.back() != bottom) references_.push_back(bottom);
+    }
+    std::sort(references_.begin(), references_.end());
+    references_.erase(std::unique(references_.begin(), references_.end()), references_.end());
+    const bool same = references_.size() == object->references.size() &&
+                      std::equal(references_.begin(), references_.end(), object->references.begin(),
+                                 [](TracingObject* a, const Ref<TracingObject>& b) { return a == b.get(); });
+    if (!same) {
+        object->references.clear();
+        for (TracingObject* reference : references_) object->references.emplace_back(reference);
+    }
+    object->instance_data.assign(instances.begin(), instances.end());
+}
+
+void RecorderCore::writeInstances(TracingObject& tracing) {
+    if (tracing.instance_data.empty()) return;
+    natives_.clear();
+    for (TracingObject* bottom : tracing.instance_tracings)
+        natives_.push_back(bottom ? bottom->nativeTracing() : nullptr);
+    const uint64_t size = tracing.instance_data.size() * device_->backend->instanceSize();
+    const uint32_t place = appendInline(nullptr, size, 16);
+    device_->backend->writeInstances(tracing.instance_data, natives_, list_.inline_data.data() + place);
+    const uint32_t resource = use(*tracing.instance_buffer);
+    beginAccesses();
+    access(resource, Stage::Copy, AccessWrite);
+    auto& command = push<CopyInlineCommand>(CommandType::CopyInline);
+    command.buffer = resource;
+    command.data = place;
+    command.size = size;
+}
+
+void RecorderCore::buildTracing(const Tracing& tracing, const Buffer& scratch, uint64_t offset, bool update,
+                                Where where) {
+    const char* what = update ? "updateTracing" : "buildTracing";
+    if (!recording(where) || !usable(tracing, what, where)) return;
+    auto* object = static_cast<TracingObject*>(tracing.object());
+    const uint64_t size = update ? object->nativeTracing()->update_size : object->nativeTracing()->build_size;
+    if (update && !(object->flags & Tracing::FlagUpdate))
+        return fail(where, ErrorCode::InvalidArgument, "tracing.update",
+                    "updateTracing: {} was made without Tracing::FlagUpdate", object->label());
+    if (update && !object->built)
+        return fail(where, ErrorCode::InvalidArgument, "tracing.unbuilt", "updateTracing: {} has not been built",
+                    object->label());
+    if (object->compacted)
+        return fail(where, ErrorCode::InvalidArgument, "tracing.compacted",
+                    "{}: {} has been compacted and cannot be built again", what, object->label());
+    BufferObject* memory = nullptr;
+    Ref<BufferObject> own;
+    if (scratch.state() == ObjectState::Null) {
+        Expected<Ref<BufferObject>> shared = device_->acquireScratch(size, where);
+        if (!shared) return fail(shared.error());
+        own = *shared;
+        memory = own.get();
+    } else {
+        memory = usableBuffer(scratch, Buffer::FlagScratch, what, where);
+        if (!memory) return;
+        if (offset % device_->features().scratchAlignment)
+            return fail(where, ErrorCode::InvalidArgument, "tracing.scratch_alignment",
+                        "{}: scratch offset {} is not a multiple of {}", what, offset,
+                        device_->features().scratchAlignment);
+        if (offset > memory->size || memory->size - offset < size)
+            return fail(where, ErrorCode::OutOfRange, "tracing.scratch",
+                        "{}: {} needs {} bytes of scratch memory, {} has {} from offset {}", what, object->label(),
+                        size, memory->label(), memory->size, offset);
+    }
+    buildTracings({&object, 1}, {&offset, 1}, *memory, update, where);
+}
+
+void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
+                                 BufferObject& scratch, bool update, Where where) {
+    if (!recording(where)) return;
+    const uint32_t scratch_resource = use(scratch);
+    for (TracingObject* tracing : tracings)
+        if (tracing->tracing_type == Tracing::TypeInstance) writeInstances(*tracing);
+    builds_.clear();
+    beginAccesses();
+    access(scratch_resource, Stage::Build, AccessWrite);
+    for (size_t i = 0; i < tracings.size(); i++) {
+        TracingObject& tracing = *tracings[i];
+        TracingBuild build;
+        build.tracing = use(tracing);
+        build.update = update;
+        build.scratch = scratch_resource;
+        build.scratch_offset = offsets[i];
+        access(build.tracing, Stage::Build, static_cast<uint8_t>(update ? AccessRead | AccessWrite : AccessWrite));
+        for (const Ref<BufferObject>& buffer : tracing.buffers) access(use(*buffer), Stage::Build, AccessRead);
+        if (tracing.tracing_type == Tracing::TypeInstance) {
+            for (const Ref<TracingObject>& reference : tracing.references) {
+                if (!reference->built)
+                    return fail(where, ErrorCode::InvalidArgument, "tracing.unbuilt",
+                                "buildTracing: {} refers to {}, which has not been built", tracing.label(),
+                                reference->label());
+                access(use(*reference), Stage::Build, AccessRead);
+            }
+            build.instances = use(*tracing.instance_buffer);
+            build.instance_count = static_cast<uint32_t>(tracing.instance_data.size());
+            access(build.instances, Stage::Build, AccessRead);
+        }
+        tracing.built = true;
+        builds_.push_back(build);
+    }
+    const uint32_t place = append(builds_.data(), builds_.size() * sizeof(TracingBuild));
+    auto& command = push<BuildTracingsCommand>(CommandType::BuildTracings);
+    command.builds = place;
+    command.count = static_cast<uint32_t>(builds_.size());
+}
+
+void RecorderCore::copyTracing(TracingObject& destination, TracingObject& source, bool compact) {
+    const uint32_t to = use(destination);
+    const uint32_t from = use(source);
+    beginAccesses();
+    access(from, Stage::Build, AccessRead);
+    access(to, Stage::Build, AccessWrite);
+    auto& command = push<CopyTracingCommand>(CommandType::CopyTracing);
+    command.source = from;
+    command.destination = to;
+    command.compact = compact;
+}
+
+void RecorderCore::writeTracingSize(TracingObject& tracing) {
+    const uint32_t resource = use(tracing);
+    beginAccesses();
+    access(resource, Stage::Build, AccessRead);
+    push<WriteTracingSizeCommand>(CommandType::WriteTracingSize).tracing = resource;
+}
+
+}  // namespace glint::detail

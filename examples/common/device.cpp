@@ -1,0 +1,57 @@
+#include "common/device.h"
+
+#include <glint/graphics/picture.h>
+
+#include <cstdio>
+
+using namespace glint;
+
+Device openDevice(Example& example, FeatureMask required) {
+    const ExampleOptions& options = example.options();
+    const bool traces = required & (FeatureComputeTracing | FeatureFragmentTracing | FeatureRayTracing);
+    if (traces && options.tracing == "software") {
+        std::fprintf(stderr, "--tracing software: this version traces with the driver only\n");
+        return Device();
+    }
+    Device device = Device::create({.api = options.api, .adapter = options.adapter, .required = required});
+    if (!device) return device;
+    Statistics& statistics = example.statistics();
+    const DeviceInfo& info = device.getInfo();
+    statistics.adapter = info.name;
+    statistics.driver = info.driver;
+    statistics.api = info.api + " " + info.version;
+    if (traces) statistics.tracing = "driver";
+    for (uint32_t i = 0; i < FeatureCount; i++)
+        if (device.getFeatures().has(1ull << i)) statistics.features.push_back(featureNames(1ull << i));
+    return device;
+}
+
+int finish(Example& example, Device& device, const Texture& picture) {
+    const Expected<Image> image = readImage(device, picture);
+    if (!image) return report(image.error());
+    if (Status status = example.saveImage(*image); !status) return report(status.error());
+    return example.finish();
+}
+
+void PassTimer::begin(Recorder& recorder, const std::string& pass) {
+    recorder.pushRegion(pass);
+    if (!device_.getFeatures().has(FeatureTimestamps)) return;
+    if (used_ == queries_.size()) queries_.emplace_back(pass, device_.createQuery(Query::TypeTime, pass));
+    queries_[used_].first = pass;
+    recorder.beginQuery(queries_[used_].second);
+}
+
+void PassTimer::end(Recorder& recorder) {
+    if (device_.getFeatures().has(FeatureTimestamps)) recorder.endQuery(queries_[used_++].second);
+    recorder.popRegion();
+}
+
+Status PassTimer::collect() {
+    for (size_t i = 0; i < used_; i++) {
+        const Expected<uint64_t> time = device_.getTime(queries_[i].second);
+        if (!time) return time.error();
+        example_.statistics().addPass(queries_[i].first, *time);
+    }
+    used_ = 0;
+    return device_.finish();
+}

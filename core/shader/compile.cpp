@@ -1,13 +1,15 @@
 #include "shader_source.h"
 
 #include <glint/base/format_error.h>
-#include <glint/base/log.h>
 
+#include <glslang/Include/intermediate.h>
+#include <glslang/MachineIndependent/localintermediate.h>
 #include <glslang/Public/ResourceLimits.h>
 #include <glslang/Public/ShaderLang.h>
 #include <glslang/SPIRV/GlslangToSpv.h>
 #include <spirv/unified1/spirv.hpp>
 
+#include <algorithm>
 #include <charconv>
 #include <mutex>
 
@@ -87,35 +89,32 @@ std::string fileOf(const ShaderSource& source, const Preprocessed& text, const M
 void logWarnings(const ShaderSource& source, const Preprocessed& text, const std::vector<Message>& messages) {
     for (const Message& message : messages) {
         if (message.is_error) continue;
-        const Error error = sourceError(source, ErrorCode::ShaderCompile, "shader.warning", message.text,
-                                        fileOf(source, text, message), message.line);
-        log(LogLevel::Warning, error.id(), error.text());
+        logWarning(sourceError(source, ErrorCode::ShaderCompile, "shader.warning", message.text,
+                               fileOf(source, text, message), message.line));
     }
 }
 
-/// The first error, with those of other lines below it: the others of the same line tend to follow from the first.
+/// The compiler stops at the first error of a text; what it says after that about linking follows from it.
 Error firstError(const ShaderSource& source, const Preprocessed& text, const std::vector<Message>& messages) {
-    static constexpr size_t max_messages = 8;
-    const Message* first = nullptr;
-    const Message* last = nullptr;
-    std::string full;
-    size_t count = 0;
-    for (const Message& message : messages) {
-        if (!message.is_error || (last && message.source == last->source && message.line == last->line)) continue;
-        if (!first) {
-            first = &message;
-            full = message.text;
-        } else if (count < max_messages && message.line) {
-            full += fmt::format("\n  {}:{}: {}", fileOf(source, text, message), message.line, message.text);
-        }
-        last = &message;
-        count++;
-    }
-    if (!first) return sourceError(source, ErrorCode::ShaderCompile, "shader.compile", "the compiler gave no reason");
+    const auto first =
+        std::find_if(messages.begin(), messages.end(), [](const Message& message) { return message.is_error; });
+    if (first == messages.end())
+        return sourceError(source, ErrorCode::ShaderCompile, "shader.compile", "the compiler gave no reason");
     const char* id = first->text.find("Missing entry point") != std::string::npos ? "shader.entry" : "shader.compile";
-    return sourceError(source, ErrorCode::ShaderCompile, id, std::move(full), fileOf(source, text, *first),
-                       first->line);
+    return sourceError(source, ErrorCode::ShaderCompile, id, first->text, fileOf(source, text, *first), first->line);
 }
+
+/// Keeps resource arrays declared without a length that way. The compiler would give one that is never indexed by a
+/// variable the length that its constant indices show, so that stages sharing a declaration would disagree about it.
+class KeepUnsized : public glslang::TIntermTraverser {
+public:
+    void visitSymbol(glslang::TIntermSymbol* symbol) override {
+        glslang::TType& type = symbol->getWritableType();
+        const glslang::TStorageQualifier storage = type.getQualifier().storage;
+        if (type.isUnsizedArray() && (storage == glslang::EvqUniform || storage == glslang::EvqBuffer))
+            type.setArrayVariablyIndexed();
+    }
+};
 
 /// OpSourceExtension only repeats the #extension lines, most of which are not the user's.
 void dropSourceExtensions(std::vector<uint32_t>& words) {
@@ -153,6 +152,8 @@ Expected<std::vector<uint32_t>> compile(const ShaderSource& source, const Prepro
     logWarnings(source, text, messages);
     if (!parsed) return unexpected(firstError(source, text, messages));
 
+    KeepUnsized keep_unsized;
+    shader.getIntermediate()->getTreeRoot()->traverse(&keep_unsized);
     glslang::TProgram program;
     program.addShader(&shader);
     const bool linked = program.link(rules);

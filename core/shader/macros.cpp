@@ -1,6 +1,7 @@
 #include "shader_source.h"
 
 #include <glint/base/format_error.h>
+#include <glint/base/log.h>
 
 #include <algorithm>
 #include <map>
@@ -119,6 +120,12 @@ Error sourceError(const ShaderSource& source, ErrorCode code, const char* id, st
     const Expected<std::vector<Macro>> macros = collectMacros(source);
     return Error::inFile(code, id, std::move(message), file.empty() ? displayName(source) : std::move(file), line,
                          macros ? describeMacros(*macros) : source.macros);
+}
+
+void logWarning(const Error& error) {
+    // The log adds the id itself.
+    const std::string text = error.text();
+    log(LogLevel::Warning, error.id(), std::string_view(text).substr(0, text.rfind(" [")));
 }
 
 }  // namespace shader

@@ -155,7 +155,6 @@ private:
         std::string_view text = *file.text;
         if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);
         Place place{.file = &file, .source = source};
-        if (stack_.size() >= max_depth) return fail("shader.include", place, describeDepth(file));
         stack_.push_back(&file);
         const size_t groups = conditions_.groups().size();
         bool guarded = false;
@@ -287,6 +286,7 @@ private:
         const Included& file = **found;
         noteFile(file);
         if (once_.contains(file.identity)) return {};
+        if (stack_.size() > max_depth) return fail("shader.include", place, describeDepth(file));
         const uint32_t index = sourceIndex(file.name);
         body_ += "\n" + lineDirective(1, index);
         return expand(file, index);
@@ -304,16 +304,19 @@ private:
         return fmt::format("cannot find include '{}' in {}", name, places);
     }
 
+    /// Why includes nest so deeply that `file` cannot be taken.
     std::string describeDepth(const Included& file) const {
-        const auto first = std::find_if(stack_.begin(), stack_.end(),
-                                        [&](const Included* entry) { return entry->identity == file.identity; });
-        if (first == stack_.end()) return fmt::format("includes are nested more than {} deep", max_depth);
-        std::string cycle;
-        for (auto entry = first; entry != stack_.end(); ++entry) {
-            if (entry != first && (*entry)->identity == file.identity) break;
-            cycle += (*entry)->name + " -> ";
+        std::vector<const Included*> chain = stack_;
+        chain.push_back(&file);
+        for (auto first = chain.begin(); first != chain.end(); ++first) {
+            const auto again = std::find_if(
+                first + 1, chain.end(), [&](const Included* entry) { return entry->identity == (*first)->identity; });
+            if (again == chain.end()) continue;
+            std::string cycle;
+            for (auto entry = first; entry != again; ++entry) cycle += (*entry)->name + " -> ";
+            return fmt::format("include cycle: {}{}", cycle, (*again)->name);
         }
-        return fmt::format("include cycle: {}{}", cycle, file.name);
+        return fmt::format("includes are nested more than {} deep", max_depth);
     }
 
     size_t onceIndex(const std::string& identity) {

@@ -213,8 +213,16 @@ private:
             constant.default_value = value.scalar();
             reflection_.constants.push_back(std::move(constant));
         }
-        std::sort(reflection_.constants.begin(), reflection_.constants.end(),
-                  [](const SpecializationConstant& a, const SpecializationConstant& b) { return a.id < b.id; });
+        // glslang makes a nameless constant of local_size_x_id, beside the one that the text may declare for the same
+        // id.
+        std::vector<SpecializationConstant>& list = reflection_.constants;
+        std::sort(list.begin(), list.end(), [](const SpecializationConstant& a, const SpecializationConstant& b) {
+            return a.id != b.id ? a.id < b.id : a.name > b.name;
+        });
+        list.erase(
+            std::unique(list.begin(), list.end(),
+                        [](const SpecializationConstant& a, const SpecializationConstant& b) { return a.id == b.id; }),
+            list.end());
     }
 
     void readGroupSize() {
@@ -260,19 +268,19 @@ private:
 /// `stage` may be Count: the first entry point of that name, or the first of all.
 Expected<Reflection> readModule(std::span<const uint32_t> words, ShaderStage stage, std::string_view entry) {
     try {
-        Module module(words.data(), words.size());
-        std::optional<spirv_cross::EntryPoint> chosen;
+        std::optional<shader::EntryPoint> chosen;
         std::optional<ShaderStage> found;
-        for (const spirv_cross::EntryPoint& point : module.get_entry_points_and_stages()) {
+        for (const shader::EntryPoint& point : shader::entryPoints(words)) {
             if (!entry.empty() && point.name != entry) continue;
-            found = stageOf(point.execution_model);
+            found = stageOf(static_cast<spv::ExecutionModel>(point.model));
             if (stage != ShaderStage::Count && found != stage) continue;
             chosen = point;
             break;
         }
         if (!chosen) throw Refusal(fmt::format("there is no entry point '{}'", entry));
         if (!found) throw Refusal(fmt::format("entry point '{}' is for no stage that Glint knows", chosen->name));
-        module.set_entry_point(chosen->name, chosen->execution_model);
+        Module module(words.data(), words.size());
+        module.set_entry_point(std::string(chosen->name), static_cast<spv::ExecutionModel>(chosen->model));
         Reflection reflection;
         reflection.stage = *found;
         reflection.entry = chosen->name;

@@ -111,7 +111,7 @@ struct Reflection {
     std::array<uint32_t, 3> group_size = {1, 1, 1};  ///< compute, task and mesh stages; constants at their defaults
     /// Id of the specialisation constant that sets this dimension of group_size, no_constant if it is fixed.
     std::array<uint32_t, 3> group_constants = {no_constant, no_constant, no_constant};
-    bool uses_ray_query = false;
+    bool uses_ray_query = false;  ///< or declares an acceleration structure outside the ray-tracing stages
     bool uses_addresses = false;  ///< buffer references
     bool uses_float64 = false;
     bool uses_int64 = false;

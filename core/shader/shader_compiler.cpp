@@ -2,7 +2,6 @@
 #include "shader_source.h"
 
 #include <glint/base/format_error.h>
-#include <glint/base/log.h>
 
 #include <glslang/Public/ShaderLang.h>
 #include <spirv-tools/libspirv.h>
@@ -42,7 +41,7 @@ Expected<CompiledShader> finish(const ShaderSource& source, std::vector<uint32_t
     CompiledShader result;
     result.reflection = std::move(*reflection);
     Expected<std::vector<uint32_t>> optimized = shader::optimizeValid(source, words);
-    if (!optimized) log(LogLevel::Warning, optimized.error().id(), optimized.error().text());
+    if (!optimized) shader::logWarning(optimized.error());
     result.words = optimized ? std::move(*optimized) : std::move(words);
     return result;
 }

@@ -27,6 +27,9 @@ std::string displayName(const ShaderSource& source);
 Error sourceError(const ShaderSource& source, ErrorCode code, const char* id, std::string message,
                   std::string file = {}, uint32_t line = 0);
 
+/// Sends an error that stops nothing to the log.
+void logWarning(const Error& error);
+
 /// A file that #include has found.
 struct Included {
     std::string name;      ///< for messages, and what its own includes are relative to
@@ -53,9 +56,16 @@ bool usesExplicitTypes(std::string_view text);
 /// Words in this machine's byte order: SPIR-V may come in either.
 std::vector<uint32_t> nativeWords(std::span<const uint32_t> words);
 
-/// `validate` without the check of the stage; the words' own complaint, or nothing. `position` is the index of the
-/// instruction that it concerns.
-std::optional<std::string> findFault(std::span<const uint32_t> words, uint64_t* position = nullptr);
+/// `validate` without the check of the stage; what is wrong with the words, or nothing. `instruction` is the number of
+/// the instruction that it concerns, counted from 1, 0 if it is none.
+std::optional<std::string> findFault(std::span<const uint32_t> words, uint64_t* instruction = nullptr);
+
+/// The entry points of a module in their order; names point into the words.
+struct EntryPoint {
+    uint32_t model = 0;  ///< SPIR-V's number of the stage
+    std::string_view name;
+};
+std::vector<EntryPoint> entryPoints(std::span<const uint32_t> words);
 
 /// Whether the module has the entry point that the source asks for. Errors: "shader.stage", "shader.entry".
 Status checkEntry(const ShaderSource& source, std::span<const uint32_t> words);

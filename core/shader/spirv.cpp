@@ -51,8 +51,8 @@ struct Complaint {
     }
 };
 
-/// The line of the text on which instruction `index` of the module begins, 0 if there are not so many.
-uint32_t lineOfInstruction(std::string_view text, uint64_t index) {
+/// The line of the text on which the module's instruction of this number, counted from 1, begins; 0 if there is none.
+uint32_t lineOfInstruction(std::string_view text, uint64_t instruction) {
     uint64_t count = 0;
     uint32_t line = 1;
     for (size_t begin = 0; begin < text.size(); line++) {
@@ -63,20 +63,9 @@ uint32_t lineOfInstruction(std::string_view text, uint64_t index) {
         // An instruction may go on in the next line; it begins with its opcode or with the id that it defines.
         const bool starts =
             content.starts_with("Op") || (content.starts_with('%') && content.find('=') != content.npos);
-        if (starts && count++ == index) return line;
+        if (starts && ++count == instruction) return line;
     }
     return 0;
-}
-
-/// Index of the instruction that holds the word at `offset`.
-uint64_t instructionAt(std::span<const uint32_t> words, size_t offset) {
-    uint64_t index = 0;
-    for (size_t i = header_words; i < words.size(); index++) {
-        const size_t length = words[i] >> 16;
-        if (length == 0 || offset < i + length) break;
-        i += length;
-    }
-    return index;
 }
 
 }  // namespace
@@ -88,7 +77,7 @@ std::vector<uint32_t> nativeWords(std::span<const uint32_t> words) {
     return result;
 }
 
-std::optional<std::string> findFault(std::span<const uint32_t> words, uint64_t* position) {
+std::optional<std::string> findFault(std::span<const uint32_t> words, uint64_t* instruction) {
     if (words.size() < header_words) return fmt::format("{} words are too few for a SPIR-V module", words.size());
     if (words[0] != spv::MagicNumber)
         return fmt::format("the first word is {:#010x}, SPIR-V begins with {:#010x}", words[0], spv::MagicNumber + 0u);
@@ -99,25 +88,34 @@ std::optional<std::string> findFault(std::span<const uint32_t> words, uint64_t* 
     options.SetScalarBlockLayout(true);
     options.SetWorkgroupScalarBlockLayout(true);
     if (tools.Validate(words.data(), words.size(), options)) return {};
-    if (position) *position = instructionAt(words, complaint.position.index);
+    if (instruction) *instruction = complaint.position.index;
+    while (!complaint.text.empty() && (complaint.text.back() == ' ' || complaint.text.back() == '\n'))
+        complaint.text.pop_back();
     return complaint.text.empty() ? "the module is not valid" : complaint.text;
+}
+
+std::vector<EntryPoint> entryPoints(std::span<const uint32_t> words) {
+    std::vector<EntryPoint> points;
+    for (size_t i = header_words; i < words.size();) {
+        const size_t length = words[i] >> 16;
+        if (length == 0 || length > words.size() - i) break;
+        if ((words[i] & 0xffffu) == spv::OpEntryPoint && length > 3) {
+            const char* text = reinterpret_cast<const char*>(&words[i + 3]);
+            points.push_back({words[i + 1], {text, ::strnlen(text, (length - 3) * sizeof(uint32_t))}});
+        }
+        i += length;
+    }
+    return points;
 }
 
 Status checkEntry(const ShaderSource& source, std::span<const uint32_t> words) {
     const auto model = static_cast<uint32_t>(modelOf(source.stage));
     bool named = false;
     std::string others;
-    for (size_t i = header_words; i < words.size();) {
-        const size_t length = words[i] >> 16;
-        if (length == 0 || length > words.size() - i) break;
-        if ((words[i] & 0xffffu) == spv::OpEntryPoint && length > 3) {
-            const char* text = reinterpret_cast<const char*>(&words[i + 3]);
-            const std::string_view name(text, ::strnlen(text, (length - 3) * sizeof(uint32_t)));
-            if (name == source.entry && words[i + 1] == model) return {};
-            named = named || name == source.entry;
-            others += fmt::format("{}'{}'", others.empty() ? "" : ", ", name);
-        }
-        i += length;
+    for (const EntryPoint& point : entryPoints(words)) {
+        if (point.name == source.entry && point.model == model) return {};
+        named = named || point.name == source.entry;
+        others += fmt::format("{}'{}'", others.empty() ? "" : ", ", point.name);
     }
     if (named)
         return sourceError(
@@ -143,12 +141,12 @@ Expected<std::vector<uint32_t>> assemble(const ShaderSource& source) {
 
 Status validate(const ShaderSource& source, std::span<const uint32_t> words) {
     if (words.empty()) return sourceError(source, ErrorCode::ShaderCompile, "shader.empty", "the module has no words");
-    uint64_t position = 0;
-    std::optional<std::string> fault = findFault(words, &position);
+    uint64_t instruction = 0;
+    std::optional<std::string> fault = findFault(words, &instruction);
     if (!fault) return checkEntry(source, words);
     const bool has_lines = source.language == ShaderSource::Language::Assembly;
     return sourceError(source, ErrorCode::ShaderCompile, "shader.validate", std::move(*fault), {},
-                       has_lines ? lineOfInstruction(source.text, position) : 0);
+                       has_lines ? lineOfInstruction(source.text, instruction) : 0);
 }
 
 Expected<std::vector<uint32_t>> optimizeValid(const ShaderSource& source, std::span<const uint32_t> words) {

@@ -1,0 +1,12 @@
+// Constants of mathematics for GLSL: #include <glint/constants.h>.
+#pragma once
+
+#define GLINT_PI 3.14159265358979323846
+#define GLINT_TWO_PI 6.28318530717958647693
+#define GLINT_HALF_PI 1.57079632679489661923
+#define GLINT_INVERSE_PI 0.31830988618379067154
+#define GLINT_SQRT_TWO 1.41421356237309504880
+#define GLINT_GOLDEN_RATIO 1.61803398874989484820
+// The largest finite float, and the distance from 1 to the next one.
+#define GLINT_FLOAT_MAX 3.402823466e38
+#define GLINT_FLOAT_EPSILON 1.1920928955e-7

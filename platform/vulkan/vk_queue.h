@@ -1,0 +1,65 @@
+#pragma once
+
+#include "platform/vulkan/vk_layout.h"
+#include "platform/vulkan/vk_player.h"
+#include "platform/vulkan/vk_upload.h"
+
+#include <glint/device/detail/backend.h>
+
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace glint::vulkan {
+
+/// What one submission needs until it is done, and the next one can have again.
+struct Frame {
+    VkCommandPool pool = VK_NULL_HANDLE;
+    VkCommandBuffer commands = VK_NULL_HANDLE;
+    uint64_t value = 0;
+    std::vector<std::pair<SetLayout*, VkDescriptorSet>> sets;
+    std::vector<std::unique_ptr<Chunk>> chunks;
+    std::string regions;   ///< names of the lists and outer regions, for the message of a lost device
+};
+
+/// A queue with its time line. All but completed() under the submit lock.
+class VulkanQueue {
+public:
+    VulkanQueue(VulkanDevice& device, VkQueue handle, uint32_t family, VkQueueFlags flags, uint32_t timestamp_bits);
+    ~VulkanQueue();
+    VulkanQueue(const VulkanQueue&) = delete;
+    VulkanQueue& operator=(const VulkanQueue&) = delete;
+
+    Status create(const char* name);
+    Status submit(const detail::Submission& submission, std::span<const VkSemaphoreSubmitInfo> waits);
+    /// From any thread.
+    uint64_t completed() const;
+    /// What ran last and what did not finish, for the message of a lost device.
+    std::string progress() const;
+
+    VkQueue handle() const { return handle_; }
+    uint32_t family() const { return family_; }
+    VkSemaphore timeline() const { return timeline_; }
+    uint32_t timestampBits() const { return timestamp_bits_; }
+    /// Graphics, compute and transfer bits, each implying the next.
+    VkQueueFlags flags() const { return flags_; }
+
+private:
+    Expected<std::unique_ptr<Frame>> acquire();
+    void recycle(std::unique_ptr<Frame> frame);
+    void recycleCompleted();
+
+    VulkanDevice& device_;
+    const VkQueue handle_;
+    const uint32_t family_;
+    const VkQueueFlags flags_;
+    const uint32_t timestamp_bits_;
+    VkSemaphore timeline_ = VK_NULL_HANDLE;
+    Player player_;
+    std::vector<std::unique_ptr<Frame>> pending_;   ///< in order of their values
+    std::vector<std::unique_ptr<Frame>> free_;
+    std::string last_regions_;                      ///< of the submission that finished last
+    mutable std::atomic<uint64_t> last_completed_ = 0;
+};
+
+}  // namespace glint::vulkan

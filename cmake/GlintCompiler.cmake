@@ -23,6 +23,10 @@ target_compile_options(glint_options INTERFACE
     -Wno-missing-field-initializers
     # Contracted multiply-adds would make error bounds, and results, depend on the target.
     -ffp-contract=off)
+if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND CMAKE_CXX_COMPILER_VERSION VERSION_LESS 13)
+    # A false alarm about std::string's own copies (GCC bug 105651).
+    target_compile_options(glint_options INTERFACE -Wno-restrict)
+endif()
 if(GLINT_WARNINGS_AS_ERRORS)
     target_compile_options(glint_options INTERFACE -Werror)
 endif()

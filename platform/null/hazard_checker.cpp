@@ -180,6 +180,7 @@ void HazardChecker::wait(QueueState& queue, const TimelinePoint& point) {
         stage.ordered.join(clock);
         stage.available.join(clock);
         stage.visible.join(clock);
+        stage.settled.join(clock);
     }
 }
 
@@ -292,6 +293,7 @@ void HazardChecker::judgeBarrier(Now& now, const Barrier& barrier, std::span<con
         scope.ordered.join(memory.ordered);
         scope.available.join(memory.visible);
         scope.visible.join(memory.visible);
+        scope.settled.join(memory.settled);
     });
     for (size_t i = 0; i < images.size(); i++) {
         transition(now, images[i], sources[i]);
@@ -321,6 +323,7 @@ HazardChecker::Scope HazardChecker::gather(const Now& now, StageMask stages) con
     scope.visible = scope.available;
     scope.ordered.raise(now.kind, stages & all_slots, now.queue.position);
     scope.visible.raise(now.kind, stages & all_slots, now.queue.position);
+    scope.settled = scope.ordered;
     return scope;
 }
 
@@ -337,7 +340,8 @@ void HazardChecker::transition(Now& now, const ImageBarrier& image, const Scope&
                                part.layer, toString(image.from), toString(history.layout)));
         }
         for (const Use& write : history.writes) {
-            if (source.visible.reaches(write.site.queue, write.stages, write.position)) continue;
+            const Clock& seen = write.site.transition ? source.settled : source.visible;
+            if (seen.reaches(write.site.queue, write.stages, write.position)) continue;
             reportConflict(now, "hazard.write_after_write", image.resource, part, write, use);
             break;
         }
@@ -384,7 +388,8 @@ void HazardChecker::check(Now& now, const Access& access, const History& history
     for (const Use& write : history.writes) {
         if (use.target != 0 && write.target == use.target) continue;
         const bool direct = write.site.transition && write.site.queue == now.kind && (write.stages & use.stages);
-        if (direct || scope.visible.reaches(write.site.queue, write.stages, write.position)) continue;
+        const Clock& seen = write.site.transition ? scope.settled : scope.visible;
+        if (direct || seen.reaches(write.site.queue, write.stages, write.position)) continue;
         reportConflict(now, access.flags & AccessRead ? "hazard.read_after_write" : "hazard.write_after_write",
                        access.resource, part, write, use);
         break;

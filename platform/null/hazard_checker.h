@@ -11,9 +11,8 @@
 // - A transition reads and writes its slice, between its source and its destination stages.
 // - Attachments of one target need no order among themselves until the target is split.
 //
-// For each stage of each queue three clocks say how far every stage of every queue is ordered before it, has written
-// what is available to it, and has written what is visible to it. An access is compared with the last write and with
-// the reads since then.
+// For each stage of each queue clocks say how far every stage of every queue is ordered before it, and how far what they
+// wrote is available and visible to it. An access is compared with the last write and with the reads since then.
 
 #include <glint/base/error.h>
 #include <glint/device/detail/backend.h>
@@ -76,10 +75,12 @@ private:
         void raise(Queue queue, detail::StageMask stages, uint64_t position);
         bool reaches(Queue queue, detail::StageMask stages, uint64_t position) const;
     };
+    /// What is ordered before the later work of a stage.
     struct Scope {
         Clock ordered;
-        Clock available;
-        Clock visible;
+        Clock available;  ///< writes that a barrier has made available
+        Clock visible;    ///< writes that a barrier after that has made visible
+        Clock settled;    ///< transitions, which are available from the start, likewise
     };
     struct Signal {
         uint64_t value = 0;
@@ -130,8 +131,8 @@ private:
     };
     struct Now;
 
-    /// What a barrier with these source stages hands on: `ordered`; `available` if it orders only; `visible` if it is a
-    /// memory barrier.
+    /// What a barrier with these source stages hands on: `ordered` and, if it only orders, `available`; `visible` and
+    /// `settled` if it is a memory barrier.
     Scope gather(const Now& now, detail::StageMask stages) const;
     void wait(QueueState& queue, const detail::TimelinePoint& point);
     void signal(QueueState& queue, Queue kind, uint64_t value);

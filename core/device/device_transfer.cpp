@@ -212,8 +212,13 @@ Status DeviceObject::compact(RecorderPtr& core, std::span<TracingObject* const> 
     for (size_t i = 0; i < tracings.size(); i++) {
         NativeTracing& compacted = *copies[i]->nativeTracing();
         compacted.update_size = tracings[i]->nativeTracing()->update_size;
+        {
+            // The copy wrote what comes next to be read, not the build. The wait alone makes it visible to no one.
+            std::lock_guard lock(submit_mutex_);
+            tracings[i]->use = copies[i]->use;
+        }
         replaceNative(*tracings[i], std::move(copies[i]->native));
-        tracings[i]->compacted = !(tracings[i]->flags & Tracing::FlagUpdate);
+        tracings[i]->compacted = true;
     }
     return {};
 }

@@ -57,7 +57,7 @@ uint64_t NullTracing::size(const NativeTracingDesc& desc) {
 }
 
 NullTracing::NullTracing(std::shared_ptr<NullControl> control, const NativeTracingDesc& desc)
-    : NullMemory(std::move(control), size(desc), desc.name), type(desc.type) {
+    : NullMemory(std::move(control), size(desc), desc.name), type(desc.type), is_compacted(desc.compacted_size != 0) {
     memory = size(desc);
     address = (life.id() + 1) << 20;
     if (desc.compacted_size == 0) {

@@ -113,6 +113,7 @@ struct NullTracing final : detail::NativeTracing, NullMemory {
     static uint64_t size(const detail::NativeTracingDesc& desc);
 
     Tracing::Type type = Tracing::TypeTriangle;
+    bool is_compacted = false;
     std::vector<const detail::Object*> inputs;  ///< buffers of its geometries
     std::vector<uint64_t> references;           ///< addresses in the instances it was built from, each once
     uint64_t compacted_size = 0;

@@ -230,6 +230,7 @@ void NullPlayer::play(const BuildTracingsCommand& command) {
     for (const TracingBuild& build : std::span(list_->at<TracingBuild>(command.builds), command.count)) {
         auto& tracing = native<NullTracing>(build.tracing);
         counters_.builds++;
+        if (tracing.is_compacted && !build.update) complain(build.tracing, "it was compacted and has no room for a build");
         bytes(build.scratch, build.scratch_offset, build.update ? tracing.update_size : tracing.build_size);
         if (build.instances == none) continue;
         const std::byte* records =

@@ -85,7 +85,7 @@ void RecorderCore::buildTracing(const Tracing& tracing, const Buffer& scratch, u
     if (update && !object->built)
         return fail(where, ErrorCode::InvalidArgument, "tracing.unbuilt", "updateTracing: {} has not been built",
                     object->label());
-    if (object->compacted)
+    if (object->compacted && !update)
         return fail(where, ErrorCode::InvalidArgument, "tracing.compacted",
                     "{}: {} has been compacted and cannot be built again", what, object->label());
     BufferObject* memory = nullptr;

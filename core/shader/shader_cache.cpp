@@ -29,17 +29,6 @@ struct CacheFolder {
     mutable std::once_flag complained;
 };
 
-std::filesystem::path defaultFolder() {
-    const auto variable = [](const char* name) {
-        const char* value = std::getenv(name);
-        return std::filesystem::path(value ? value : "");
-    };
-    if (std::getenv("GLINT_CACHE")) return variable("GLINT_CACHE");
-    if (const auto base = variable("XDG_CACHE_HOME"); !base.empty()) return base / "glint";
-    if (const auto home = variable("HOME"); !home.empty()) return home / ".cache" / "glint";
-    return {};
-}
-
 struct CacheState {
     std::mutex mutex;
     std::shared_ptr<const CacheFolder> folder;
@@ -60,7 +49,7 @@ std::shared_ptr<const CacheFolder> makeFolder(std::filesystem::path path, uint64
 
 std::shared_ptr<const CacheFolder> cacheFolder() {
     std::lock_guard lock(cacheState().mutex);
-    if (!cacheState().folder) cacheState().folder = makeFolder(defaultFolder(), 256ull << 20);
+    if (!cacheState().folder) cacheState().folder = makeFolder(shader::defaultCacheFolder(), 256ull << 20);
     return cacheState().folder;
 }
 
@@ -188,6 +177,17 @@ void setShaderCache(const std::filesystem::path& folder, uint64_t limit) {
 
 namespace shader {
 
+std::filesystem::path defaultCacheFolder() {
+    const auto variable = [](const char* name) {
+        const char* value = std::getenv(name);
+        return std::filesystem::path(value ? value : "");
+    };
+    if (std::getenv("GLINT_CACHE")) return variable("GLINT_CACHE");
+    if (const auto base = variable("XDG_CACHE_HOME"); !base.empty()) return base / "glint";
+    if (const auto home = variable("HOME"); !home.empty()) return home / ".cache" / "glint";
+    return {};
+}
+
 std::optional<CompiledShader> loadFromCache(const Hash& key) {
     const std::shared_ptr<const CacheFolder> folder = cacheFolder();
     if (folder->path.empty()) return {};
@@ -253,10 +253,10 @@ void storeInCache(const Hash& key, const CompiledShader& shader) {
         return;
     }
     const std::filesystem::path path = entryPath(*folder, key);
-    const FileStamp former = stampFile(path);
     // A quarter more than needed, so that not every store has to look at the whole folder.
     if (ledger.total() + bytes.size() > folder->limit)
         ledger.evict(std::min(folder->limit - folder->limit / 4, folder->limit - bytes.size()));
+    const FileStamp former = stampFile(path);
     if (!ledger.setTotal(ledger.total() + bytes.size())) return complain(std::strerror(errno));
     if (Status status = writeFile(path, bytes); !status) return complain(status.error().message());
     if (former.time >= 0) ledger.setTotal(ledger.total() - std::min(ledger.total(), former.size));

@@ -14,6 +14,9 @@ std::vector<std::byte> encodeShader(const CompiledShader& shader);
 /// Nothing if the bytes are not exactly what encodeShader makes.
 std::optional<CompiledShader> decodeShader(std::span<const std::byte> bytes);
 
+/// The folder that is used unless setShaderCache names another, as the environment says now.
+std::filesystem::path defaultCacheFolder();
+
 /// Takes an entry from the cache and marks it as used. A damaged one counts as absent.
 std::optional<CompiledShader> loadFromCache(const Hash& key);
 

@@ -25,7 +25,7 @@ Vector4f heat(float difference, float threshold) {
 }
 
 std::filesystem::path savePicture(const Image& image, const std::string& name) {
-    const std::filesystem::path path = outputDir() / (name + ".png");
+    std::filesystem::path path = outputDir() / (name + ".png");
     std::filesystem::create_directories(path.parent_path());
     const Expected<Image> picture = image.convert(FormatRGBAu8n);
     if (!picture || !picture->save(path)) return {};

@@ -41,9 +41,10 @@ TEST(ThreadPool, DestructionRunsWhatIsQueued) {
 
 TEST(ThreadPool, TasksMaySubmitTasks) {
     std::atomic<int> count = 0;
+    std::function<void(int)> grow;
     {
         ThreadPool pool(2);
-        std::function<void(int)> grow = [&](int depth) {
+        grow = [&](int depth) {
             count++;
             if (depth == 0) return;
             for (int i = 0; i < 2; i++) pool.submit([&grow, depth] { grow(depth - 1); });

@@ -31,6 +31,7 @@ namespace glint::vulkan {
 #define GLINT_VULKAN_DEVICE_FUNCTIONS(X) \
     X(DestroyDevice) X(DeviceWaitIdle) X(GetDeviceQueue) X(QueueSubmit2) \
     X(CreateSemaphore) X(DestroySemaphore) X(GetSemaphoreCounterValue) X(WaitSemaphores) \
+    X(CreateFence) X(DestroyFence) X(WaitForFences) X(ResetFences) \
     X(CreateCommandPool) X(DestroyCommandPool) X(ResetCommandPool) X(AllocateCommandBuffers) \
     X(BeginCommandBuffer) X(EndCommandBuffer) \
     X(GetBufferDeviceAddress) X(CreateBufferView) X(DestroyBufferView) X(CreateImageView) X(DestroyImageView) \

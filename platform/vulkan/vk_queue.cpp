@@ -21,7 +21,7 @@ VulkanQueue::~VulkanQueue() {
         device_.vk.WaitSemaphores(device_.handle, &info, UINT64_MAX);
     }
     for (std::unique_ptr<Frame>& frame : pending_) recycle(std::move(frame));
-    for (std::unique_ptr<Frame>& frame : free_) device_.vk.DestroyCommandPool(device_.handle, frame->pool, nullptr);
+    for (std::unique_ptr<Frame>& frame : free_) destroy(*frame);
     device_.vk.DestroySemaphore(device_.handle, timeline_, nullptr);
 }
 
@@ -61,7 +61,20 @@ Expected<std::unique_ptr<Frame>> VulkanQueue::acquire() {
         return unexpected(resultError("vkAllocateCommandBuffers", result));
     }
     device_.memory.objects_created += 2;
+    if (device_.instance->validation) {
+        const VkFenceCreateInfo fence_info = {VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
+        result = device_.vk.CreateFence(device_.handle, &fence_info, nullptr, &frame->fence);
+        if (result != VK_SUCCESS) {
+            destroy(*frame);
+            return unexpected(resultError("vkCreateFence", result));
+        }
+    }
     return frame;
+}
+
+void VulkanQueue::destroy(Frame& frame) {
+    device_.vk.DestroyFence(device_.handle, frame.fence, nullptr);
+    device_.vk.DestroyCommandPool(device_.handle, frame.pool, nullptr);
 }
 
 void VulkanQueue::recycle(std::unique_ptr<Frame> frame) {
@@ -76,6 +89,10 @@ void VulkanQueue::recycleCompleted() {
     size_t done = 0;
     for (; done < pending_.size() && pending_[done]->value <= value; done++) {
         last_regions_.swap(pending_[done]->regions);
+        if (const VkFence fence = pending_[done]->fence) {
+            device_.vk.WaitForFences(device_.handle, 1, &fence, VK_TRUE, UINT64_MAX);
+            device_.vk.ResetFences(device_.handle, 1, &fence);
+        }
         recycle(std::move(pending_[done]));
     }
     pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(done));
@@ -105,7 +122,7 @@ Status VulkanQueue::submit(const detail::Submission& submission, std::span<const
     info.pCommandBufferInfos = &commands;
     info.signalSemaphoreInfoCount = 1;
     info.pSignalSemaphoreInfos = &signal;
-    const VkResult result = device_.vk.QueueSubmit2(handle_, 1, &info, VK_NULL_HANDLE);
+    const VkResult result = device_.vk.QueueSubmit2(handle_, 1, &info, frame->fence);
     if (result != VK_SUCCESS) {
         recycle(std::move(frame));
         return resultError("vkQueueSubmit2", result);

@@ -16,6 +16,7 @@ namespace glint::vulkan {
 struct Frame {
     VkCommandPool pool = VK_NULL_HANDLE;
     VkCommandBuffer commands = VK_NULL_HANDLE;
+    VkFence fence = VK_NULL_HANDLE;  ///< with validation only: its synchronisation checks follow no time lines
     uint64_t value = 0;
     std::vector<std::pair<SetLayout*, VkDescriptorSet>> sets;
     std::vector<std::unique_ptr<Chunk>> chunks;
@@ -47,6 +48,7 @@ public:
 private:
     Expected<std::unique_ptr<Frame>> acquire();
     void recycle(std::unique_ptr<Frame> frame);
+    void destroy(Frame& frame);
     void recycleCompleted();
 
     VulkanDevice& device_;

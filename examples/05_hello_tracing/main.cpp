@@ -123,7 +123,7 @@ int main(int argc, char** argv) {
         parameters.camera = camera.parameters();
         parameters.light = {2.5f, -3.0f, 5.0f, 1.0f};
         parameters.size = {static_cast<float>(example.width()), static_cast<float>(example.height()),
-                           0.75f + 0.25f * std::cos(time), 1e-3f};
+                           0.5f + 0.25f * std::sin(time), 1e-3f};
 
         const auto bind = [&](Recorder& recorder) {
             recorder.setUniform(0, parameters);

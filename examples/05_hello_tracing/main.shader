@@ -51,6 +51,7 @@ vec4 trace(vec2 pixel) {
     vec3 position = origin + direction * rayQueryGetIntersectionTEXT(query, true);
     vec3 normal = vec3(0.0, 0.0, 1.0);
     vec3 color = vec3(0.75);
+    float fade = 0.0;
     if (rayQueryGetIntersectionInstanceCustomIndexEXT(query, true) == 0) {
         uint triangle = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
         vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, true);
@@ -61,8 +62,8 @@ vec4 trace(vec2 pixel) {
         if (pixel.x > size.x * size.z) color = palette(float(triangle) * 0.0001);
     } else {
         // A checker that fades into the background.
-        float checker = mod(floor(position.x * 2.0) + floor(position.y * 2.0), 2.0);
-        color = mix(vec3(0.45 + 0.25 * checker), vec3(0.25), smoothstep(3.0, 8.0, length(position.xy)));
+        color = vec3(0.45 + 0.25 * mod(floor(position.x * 2.0) + floor(position.y * 2.0), 2.0));
+        fade = smoothstep(2.0, 7.5, length(position.xy));
     }
     if (dot(normal, direction) > 0.0) normal = -normal;
 
@@ -70,7 +71,8 @@ vec4 trace(vec2 pixel) {
     float diffuse = max(dot(normal, to_light), 0.0);
     float specular = diffuse > 0.0 ? pow(max(dot(reflect(-to_light, normal), -direction), 0.0), 16.0) : 0.0;
     float lit = diffuse > 0.0 && !isShadowed(position + normal * size.w, light.xyz) ? 1.0 : 0.0;
-    return vec4(color * (0.25 + 0.75 * diffuse * lit) + vec3(0.25 * specular * lit), 1.0);
+    color = color * (0.25 + 0.75 * diffuse * lit) + vec3(0.25 * specular * lit);
+    return vec4(mix(color, vec3(0.25), fade), 1.0);
 }
 
 #if COMPUTE_SHADER

@@ -1,0 +1,74 @@
+// The examples' pictures at small sizes against the stored ones, run as programs, with the validation layers on.
+
+#include "support/files.h"
+#include "support/image_compare.h"
+
+#include <glint/base/file.h>
+#include <glint/format/image.h>
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+namespace glint::test {
+
+namespace {
+
+/// Runs an example and returns its picture. Any message on stderr is a failure: validation layers speak there.
+Expected<Image> render(const std::string& program, const std::string& arguments, const TempDir& folder) {
+    const std::filesystem::path picture = folder / "picture.png";
+    const std::filesystem::path messages = folder / "messages.txt";
+    const std::string command = "GLINT_VALIDATION=1 '" GLINT_EXAMPLES "/" + program + "' --image '" + picture.string() +
+                                "' " + arguments + " > /dev/null 2> '" + messages.string() + "'";
+    EXPECT_EQ(std::system(command.c_str()), 0) << command;
+    const Expected<std::string> text = readTextFile(messages);
+    EXPECT_TRUE(text && text->empty()) << command << "\n" << (text ? *text : "");
+    return Image::load(picture);
+}
+
+void expectGolden(const std::string& program, const std::string& arguments, const std::string& name,
+                  const ImageTolerance& tolerance) {
+    const TempDir folder;
+    const Expected<Image> image = render(program, arguments, folder);
+    ASSERT_TRUE(image) << image.error().text();
+    EXPECT_TRUE(matchesGolden(*image, name, tolerance));
+}
+
+}  // namespace
+
+// A pixel whose centre lies on an edge, or that two rasterisers round differently, may flip: 1 of 8 along the outline
+// of about 3 * 80 pixels.
+TEST(Golden, Triangle) { expectGolden("00_hello_triangle", "--size 128x72", "00_hello_triangle", {.texels = 30}); }
+
+TEST(Golden, TriangleTurned) {
+    expectGolden("00_hello_triangle", "--size 128x72 --time 0.5", "00_hello_triangle_turned", {.texels = 30});
+}
+
+// The order in which particles blend differs from run to run: a sum of n half floats of the same sign, each rounded to
+// 2^-11, differs by less than n 2^-11 of itself. Tens of particles overlap: 2 percent before the tone curve, whose
+// slope is at most 1, so 5 of 255; pixels where more overlap are allowed for.
+TEST(Golden, Particles) {
+    expectGolden("02_hello_compute", "--size 160x90 --time 2", "02_hello_compute",
+                 {.channel = 5.5f / 255.0f, .texels = 144});
+}
+
+// Rays that graze an edge or a shadow's border fall to either side.
+TEST(Golden, TracedTorus) { expectGolden("05_hello_tracing", "--size 160x90", "05_hello_tracing", {.texels = 72}); }
+
+// The fragment form has the same scene and the same rays.
+TEST(Golden, TracedTorusFragment) {
+    expectGolden("05_hello_tracing", "--size 160x90 --fragment", "05_hello_tracing", {.texels = 72});
+}
+
+TEST(Golden, TracedBunny) {
+    if (bunnyPath().empty()) GTEST_SKIP() << "needs the Stanford bunny of Debian's package glmark2-data";
+    const std::string mesh = "--size 160x90 --mesh '" + bunnyPath().string() + "'";
+    expectGolden("05_hello_tracing", mesh, "05_hello_tracing_bunny", {.texels = 72});
+    const TempDir folder;
+    const Expected<Image> compute = render("05_hello_tracing", mesh, folder);
+    const Expected<Image> fragment = render("05_hello_tracing", mesh + " --fragment", folder);
+    ASSERT_TRUE(compute && fragment);
+    EXPECT_TRUE(imagesMatch(*fragment, *compute, "bunny_fragment_against_compute", {.texels = 8}));
+}
+
+}  // namespace glint::test

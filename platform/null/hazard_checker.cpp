@@ -38,6 +38,46 @@ const char* queueName(Queue queue) {
     return "unknown";
 }
 
+// Vulkan, "Pipeline Stages": the order of the stages of one command. Depth tests come both before and after the fragment
+// shader, so it holds neither all of them before itself nor all after.
+constexpr StageMask front_end = bit(Stage::Indirect) | bit(Stage::VertexInput) | bit(Stage::VertexShader);
+
+constexpr StageMask earlierStages(Stage stage) {
+    switch (stage) {
+        case Stage::VertexInput:
+        case Stage::Compute:
+        case Stage::RayTracing: return bit(Stage::Indirect);
+        case Stage::VertexShader: return bit(Stage::Indirect) | bit(Stage::VertexInput);
+        case Stage::Fragment: return front_end;
+        case Stage::DepthTarget: return front_end | bit(Stage::Fragment);
+        case Stage::ColorTarget: return front_end | bit(Stage::Fragment) | bit(Stage::DepthTarget);
+        default: return 0;
+    }
+}
+
+constexpr StageMask laterStages(Stage stage) {
+    constexpr StageMask back_end = bit(Stage::Fragment) | bit(Stage::DepthTarget) | bit(Stage::ColorTarget);
+    switch (stage) {
+        case Stage::Indirect:
+            return bit(Stage::VertexInput) | bit(Stage::VertexShader) | back_end | bit(Stage::Compute) |
+                   bit(Stage::RayTracing);
+        case Stage::VertexInput: return bit(Stage::VertexShader) | back_end;
+        case Stage::VertexShader: return back_end;
+        case Stage::Fragment: return bit(Stage::ColorTarget);
+        case Stage::DepthTarget: return bit(Stage::Fragment) | bit(Stage::ColorTarget);
+        default: return 0;
+    }
+}
+
+/// `stages` and those of its pipeline before or after them.
+template <StageMask others(Stage)>
+StageMask extended(StageMask stages) {
+    StageMask all = stages & all_slots;
+    for (size_t i = 0; i < stage_count; i++)
+        if (stages & (1u << i)) all |= others(static_cast<Stage>(i));
+    return all;
+}
+
 bool isTargetStage(Stage stage) { return stage == Stage::ColorTarget || stage == Stage::DepthTarget; }
 
 bool overlap(const Slice& a, const Slice& b) {
@@ -288,16 +328,17 @@ void HazardChecker::judgeBarrier(Now& now, const Barrier& barrier, std::span<con
     std::vector<Scope> sources;
     for (const ImageBarrier& image : images) sources.push_back(gather(now, image.source));
     now.queue.position++;
-    forEachStage(barrier.destination, [&](size_t stage) {
+    forEachStage(extended<laterStages>(barrier.destination), [&](size_t stage) {
         Scope& scope = now.queue.stages[stage];
         scope.ordered.join(memory.ordered);
         scope.available.join(memory.visible);
+        if (!(barrier.destination & (1u << stage))) return;
         scope.visible.join(memory.visible);
         scope.settled.join(memory.settled);
     });
     for (size_t i = 0; i < images.size(); i++) {
         transition(now, images[i], sources[i]);
-        forEachStage(images[i].destination, [&](size_t stage) {
+        forEachStage(extended<laterStages>(images[i].destination), [&](size_t stage) {
             now.queue.stages[stage].ordered.join(sources[i].ordered);
             now.queue.stages[stage].available.join(sources[i].available);
         });
@@ -312,7 +353,8 @@ void HazardChecker::judgeBarrier(Now& now, const Barrier& barrier, std::span<con
 
 HazardChecker::Scope HazardChecker::gather(const Now& now, StageMask stages) const {
     Scope scope;
-    forEachStage(stages, [&](size_t stage) {
+    const StageMask earlier = extended<earlierStages>(stages);
+    forEachStage(earlier, [&](size_t stage) {
         scope.ordered.join(now.queue.stages[stage].ordered);
         scope.available.join(now.queue.stages[stage].available);
     });
@@ -321,7 +363,7 @@ HazardChecker::Scope HazardChecker::gather(const Now& now, StageMask stages) con
         scope.available.join(now.queue.waited);
     }
     scope.visible = scope.available;
-    scope.ordered.raise(now.kind, stages & all_slots, now.queue.position);
+    scope.ordered.raise(now.kind, earlier, now.queue.position);
     scope.visible.raise(now.kind, stages & all_slots, now.queue.position);
     scope.settled = scope.ordered;
     return scope;

@@ -4,8 +4,9 @@
 // shares no code and no idea with the tracker that places the barriers, but follows Vulkan's rules:
 //
 // - Commands of a queue are not ordered by their order alone. A barrier orders what its source stages did before it, and
-//   what those stages had been ordered after, before its destination stages (a chain); so does a transition. A wait for
-//   another queue's time line orders everything that was submitted there before.
+//   what those stages had been ordered after, before its destination stages (a chain); so does a transition. With a
+//   source stage come the logically earlier ones of its pipeline, with a destination stage the later ones: for order, not
+//   for memory. A wait for another queue's time line orders everything that was submitted there before.
 // - A write is seen where a memory barrier, or a wait, lies on such a chain: after the write's own stage and into the
 //   stage that reads or writes next. A transition is a memory barrier for its own slice only.
 // - A transition reads and writes its slice, between its source and its destination stages.

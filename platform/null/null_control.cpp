@@ -177,6 +177,8 @@ Status NullControl::beginSubmit(const Submission& submission) {
         return makeError(ErrorCode::Internal, "null.value", "{} {} of queue {}, whose last value is {}", what, value,
                          at(queue), lines_[at(queue)].submitted);
     };
+    if (submission.queue != Queue::Main && !settings_.queues[at(submission.queue)])
+        return makeError(ErrorCode::Internal, "null.value", "there is no queue {}", at(submission.queue));
     if (submission.value <= lines_[at(submission.queue)].submitted)
         return refuse("a submission with value", submission.queue, submission.value);
     for (const TimelinePoint& point : submission.waits)

@@ -82,8 +82,8 @@ TEST_F(HazardChecker, OneCommandDoesNotConflictWithItself) {
 }
 
 TEST_F(HazardChecker, WhatFollowsMustComeAfterEveryStageOfACommand) {
-    const List both = List().draw({reads(a, Stage::VertexInput), writes(a, Stage::Fragment)});
-    EXPECT_THAT(judged(List(both).barrier(fragment, compute).dispatch({writes(a, Stage::Compute)})),
+    const List both = List().draw({reads(a, Stage::Fragment), writes(a, Stage::VertexShader)});
+    EXPECT_THAT(judged(List(both).barrier(stages(Stage::VertexShader), compute).dispatch({writes(a, Stage::Compute)})),
                 ElementsAre(write_after_read));
     const List second = List().draw({writes(b, Stage::VertexShader), writes(b, Stage::Fragment)});
     EXPECT_THAT(judged(List(second).barrier(fragment, compute).dispatch({reads(b, Stage::Compute)})),
@@ -123,6 +123,42 @@ TEST_F(HazardChecker, StagesOfABarrierCount) {
     EXPECT_THAT(judged(List()
                            .dispatch({writes(c, Stage::Compute)})
                            .barrier(compute | copy, copy | compute)
+                           .command(CommandType::CopyBuffer, {reads(c, Stage::Copy)})),
+                IsEmpty());
+}
+
+TEST_F(HazardChecker, EarlierStagesOfAPipelineAreOrderedToo) {
+    // A source stage holds the stages before it, a destination stage those after it.
+    EXPECT_THAT(judged(List()
+                           .draw({reads(a, Stage::VertexInput)})
+                           .barrier(fragment, compute)
+                           .dispatch({writes(a, Stage::Compute)})),
+                IsEmpty());
+    EXPECT_THAT(judged(List()
+                           .dispatch({reads(b, Stage::Compute)})
+                           .barrier(compute, stages(Stage::VertexShader))
+                           .draw({writes(b, Stage::Fragment)})),
+                IsEmpty());
+    EXPECT_THAT(judged(List().draw({reads(c, Stage::Fragment)}).barrier(stages(Stage::VertexShader), compute).dispatch(
+                    {writes(c, Stage::Compute)})),
+                ElementsAre(write_after_read));
+    checker = makeChecker();
+    // That is order: what they wrote is not made visible.
+    EXPECT_THAT(judged(List()
+                           .draw({writes(a, Stage::VertexShader)})
+                           .barrier(fragment, compute)
+                           .dispatch({reads(a, Stage::Compute)})),
+                ElementsAre(read_after_write));
+    EXPECT_THAT(judged(List()
+                           .dispatch({writes(b, Stage::Compute)})
+                           .barrier(compute, stages(Stage::VertexShader))
+                           .draw({reads(b, Stage::Fragment)})),
+                ElementsAre(read_after_write));
+    // But it makes chains.
+    EXPECT_THAT(judged(List()
+                           .dispatch({writes(c, Stage::Compute)})
+                           .barrier(compute, stages(Stage::VertexShader))
+                           .barrier(fragment, copy)
                            .command(CommandType::CopyBuffer, {reads(c, Stage::Copy)})),
                 IsEmpty());
 }

@@ -60,9 +60,12 @@ private:
 
         const auto source = [&](const Step& b) {
             int level = Nothing;
-            bool own = a.kind == Step::Access && a.queue == b.queue && (b.source & a.source);
+            const StageMask earlier = withEarlier(b.source);
+            const bool here = a.kind == Step::Access && a.queue == b.queue;
+            const bool own = here && (b.source & a.source);
+            if (here && (earlier & a.source)) level = Ordered;
             for (size_t s = 0; s < slots; s++)
-                if (b.source >> s & 1) level = std::max<int>(level, levels[b.queue][s]);
+                if (earlier >> s & 1) level = std::max<int>(level, levels[b.queue][s]);
             if ((b.source & detail::stage_all) && waited[b.queue]) level = Visible;
             return std::pair(own, level);
         };
@@ -117,12 +120,28 @@ private:
                     }
                 }
             }
-            for (const auto& [step, level] : results)
-                for (size_t s = 0; s < slots; s++)
-                    if (step->destination >> s & 1) levels[step->queue][s] = std::max(levels[step->queue][s], level);
+            for (const auto& [step, level] : results) {
+                for (size_t s = 0; s < slots; s++) {
+                    Level& there = levels[step->queue][s];
+                    if (step->destination >> s & 1) there = std::max(there, level);
+                    else if (withLater(step->destination) >> s & 1) there = std::max(there, std::min(level, Available));
+                }
+            }
             i = end;
         }
         return std::nullopt;
+    }
+
+    /// The stages that random streams use, in the order of a draw; compute and copies stand alone.
+    static StageMask withEarlier(StageMask stages) {
+        if (stages & detail::bit(Stage::ColorTarget)) stages |= detail::bit(Stage::Fragment);
+        if (stages & detail::bit(Stage::Fragment)) stages |= detail::bit(Stage::VertexShader);
+        return stages;
+    }
+    static StageMask withLater(StageMask stages) {
+        if (stages & detail::bit(Stage::VertexShader)) stages |= detail::bit(Stage::Fragment);
+        if (stages & detail::bit(Stage::Fragment)) stages |= detail::bit(Stage::ColorTarget);
+        return stages;
     }
 
     /// True if a signal before step `from` already reached what `wait` waits for.
@@ -236,9 +255,11 @@ private:
                               .memory = {touch.thing->id, touch.slice.mip}, .write = (touch.flags & AccessWrite) != 0});
     }
 
-    static constexpr std::array<Stage, 4> used_stages = {Stage::Compute, Stage::Fragment, Stage::Copy, Stage::Build};
-    static constexpr StageMask all_used = detail::bit(Stage::Compute) | detail::bit(Stage::Fragment) |
-                                          detail::bit(Stage::Copy) | detail::bit(Stage::Build);
+    static constexpr std::array used_stages = {Stage::Compute, Stage::Copy, Stage::VertexShader, Stage::Fragment,
+                                               Stage::ColorTarget};
+    static constexpr StageMask all_used = detail::bit(Stage::Compute) | detail::bit(Stage::Copy) |
+                                          detail::bit(Stage::VertexShader) | detail::bit(Stage::Fragment) |
+                                          detail::bit(Stage::ColorTarget);
 
     std::mt19937_64 random_;
     uint64_t care_;  ///< one decision of this many is wrong

@@ -68,6 +68,7 @@ void RecorderCore::writeInstances(TracingObject& tracing) {
     beginAccesses();
     access(resource, Stage::Copy, AccessWrite);
     auto& command = push<CopyInlineCommand>(CommandType::CopyInline);
+    command.header.untracked = false;  // see buildTracings
     command.buffer = resource;
     command.data = place;
     command.size = size;
@@ -145,6 +146,8 @@ void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::
     }
     const uint32_t place = append(builds_.data(), builds_.size() * sizeof(TracingBuild));
     auto& command = push<BuildTracingsCommand>(CommandType::BuildTracings);
+    // Builds share instance records and scratch memory that the caller does not see, so they are always tracked.
+    command.header.untracked = false;
     command.builds = place;
     command.count = static_cast<uint32_t>(builds_.size());
 }

@@ -13,8 +13,10 @@ namespace glint::vulkan {
 namespace {
 
 constexpr const char* known_extensions[] = {
-    VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME, VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME,
-    VK_KHR_RAY_QUERY_EXTENSION_NAME,              VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME,
+    VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME,
+    VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME,
+    VK_KHR_RAY_QUERY_EXTENSION_NAME,
+    VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME,
     VK_EXT_MESH_SHADER_EXTENSION_NAME,
 };
 
@@ -156,10 +158,11 @@ Adapter describeAdapter(const Instance& instance, VkPhysicalDevice handle, uint3
     vk.GetPhysicalDeviceQueueFamilyProperties(handle, &count, families.data());
     constexpr VkQueueFlags graphics = VK_QUEUE_GRAPHICS_BIT, compute = VK_QUEUE_COMPUTE_BIT;
     adapter.families = {findFamily(families, graphics | compute, 0), findFamily(families, compute, graphics),
-                        findFamily(families, VK_QUEUE_TRANSFER_BIT, graphics | compute | VK_QUEUE_OPTICAL_FLOW_BIT_NV |
-                                                                        VK_QUEUE_VIDEO_DECODE_BIT_KHR)};
+                        findFamily(families, VK_QUEUE_TRANSFER_BIT,
+                                   graphics | compute | VK_QUEUE_OPTICAL_FLOW_BIT_NV | VK_QUEUE_VIDEO_DECODE_BIT_KHR)};
     for (size_t i = 0; i < detail::queue_count; i++) {
-        if (adapter.families[i] != no_family) adapter.timestamp_bits[i] = families[adapter.families[i]].timestampValidBits;
+        if (adapter.families[i] != no_family)
+            adapter.timestamp_bits[i] = families[adapter.families[i]].timestampValidBits;
     }
     info.features = offeredFeatures(adapter);
 
@@ -180,22 +183,22 @@ Expected<Adapter> chooseAdapter(const Instance& instance, const detail::BackendD
         adapters.push_back(describeAdapter(instance, handle, static_cast<uint32_t>(adapters.size())));
     }
     if (adapters.empty()) {
-        return unexpected(makeError(ErrorCode::Unsupported, "device.no_driver",
-                                    "no Vulkan driver here offers an adapter"));
+        return unexpected(
+            makeError(ErrorCode::Unsupported, "device.no_driver", "no Vulkan driver here offers an adapter"));
     }
 
     std::vector<const Adapter*> tried;
-    const bool is_index = !desc.adapter.empty() && desc.adapter.size() < 6 &&
-                          std::all_of(desc.adapter.begin(), desc.adapter.end(), [](char c) { return c >= '0' && c <= '9'; });
+    const bool is_index =
+        !desc.adapter.empty() && desc.adapter.size() < 6 &&
+        std::all_of(desc.adapter.begin(), desc.adapter.end(), [](char c) { return c >= '0' && c <= '9'; });
     for (const Adapter& adapter : adapters) {
         const bool wanted = is_index ? adapter.info.index == static_cast<uint32_t>(std::stoul(desc.adapter))
                                      : lowerCase(adapter.info.name).find(lowerCase(desc.adapter)) != std::string::npos;
         if (wanted) tried.push_back(&adapter);
     }
     if (tried.empty()) {
-        return unexpected(makeError(ErrorCode::InvalidArgument, "device.no_adapter",
-                                    "no adapter {} '{}': there are {}", is_index ? "of number" : "is called",
-                                    desc.adapter, listAdapters(adapters)));
+        return unexpected(makeError(ErrorCode::InvalidArgument, "device.no_adapter", "no adapter {} '{}': there are {}",
+                                    is_index ? "of number" : "is called", desc.adapter, listAdapters(adapters)));
     }
     std::stable_sort(tried.begin(), tried.end(), [](const Adapter* a, const Adapter* b) {
         return rank(a->properties.deviceType) > rank(b->properties.deviceType);
@@ -209,8 +212,8 @@ Expected<Adapter> chooseAdapter(const Instance& instance, const detail::BackendD
         if (missing) lacking += (lacking.empty() ? "" : ", ") + featureNames(missing);
         reasons += fmt::format("{}'{}' lacks {}", reasons.empty() ? "" : "; ", adapter->info.name, lacking);
     }
-    return unexpected(makeError(ErrorCode::Unsupported, "device.unsupported", "no adapter offers all that is needed: {}",
-                                reasons));
+    return unexpected(
+        makeError(ErrorCode::Unsupported, "device.unsupported", "no adapter offers all that is needed: {}", reasons));
 }
 
 Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
@@ -422,8 +425,8 @@ Expected<std::vector<DeviceInfo>> vulkanAdapters() {
         infos.push_back(describeAdapter(**instance, handle, static_cast<uint32_t>(infos.size())).info);
     }
     if (infos.empty()) {
-        return unexpected(makeError(ErrorCode::Unsupported, "device.no_driver",
-                                    "no Vulkan driver here offers an adapter"));
+        return unexpected(
+            makeError(ErrorCode::Unsupported, "device.no_driver", "no Vulkan driver here offers an adapter"));
     }
     return infos;
 }

@@ -36,7 +36,7 @@ struct Adapter {
     DeviceInfo info;
     /// What Glint needs and the adapter lacks: "Vulkan 1.3 (it has 1.2)"; empty if it will do.
     std::string lacking;
-    std::vector<std::string> extensions;   ///< those of the adapter that Glint knows what to do with
+    std::vector<std::string> extensions;  ///< those of the adapter that Glint knows what to do with
     FeatureChain offered;
     std::array<uint32_t, detail::queue_count> families = {no_family, no_family, no_family};
     std::array<uint32_t, detail::queue_count> timestamp_bits = {};

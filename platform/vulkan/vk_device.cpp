@@ -24,9 +24,13 @@ RawDevice::~RawDevice() {
 }
 
 VulkanDevice::VulkanDevice(std::shared_ptr<Instance> shared, const Adapter& chosen, const Enabled& wanted,
-                           const BackendDesc& desc)
-    : RawDevice(std::move(shared), desc.message), adapter(chosen), enabled(wanted), layouts(*this),
-      upload(memory, families), features_(describeFeatures(*instance, adapter, enabled.mask)) {
+                           const Messenger::Receive& receive)
+    : RawDevice(std::move(shared), receive),
+      adapter(chosen),
+      enabled(wanted),
+      layouts(*this),
+      upload(memory, families),
+      features_(describeFeatures(*instance, adapter, enabled.mask)) {
     for (uint32_t family : adapter.families) {
         if (family != no_family) families.push_back(family);
     }
@@ -42,14 +46,14 @@ Expected<std::unique_ptr<Backend>> VulkanDevice::create(const BackendDesc& desc)
     }
     Expected<Adapter> adapter = chooseAdapter(**instance, desc);
     if (!adapter) return unexpected(adapter.error());
-    std::unique_ptr<VulkanDevice> device(new VulkanDevice(
-        *instance, *adapter, enabledFeatures(*adapter, desc.required | desc.optional), desc));
+    std::unique_ptr<VulkanDevice> device(
+        new VulkanDevice(*instance, *adapter, enabledFeatures(*adapter, desc.required | desc.optional), desc.message));
     if (Status status = device->createDevice(); !status) return unexpected(status.error());
     if (Status status = device->createQueues(VK_NULL_HANDLE); !status) return unexpected(status.error());
     return device;
 }
 
-Expected<std::unique_ptr<Backend>> VulkanDevice::adopt(const ForeignDevice& foreign, const BackendDesc& desc) {
+Expected<std::unique_ptr<Backend>> VulkanDevice::adopt(const ForeignDevice& foreign) {
     std::shared_ptr<Instance> instance = Instance::adopt(foreign.instance, foreign.get);
     Adapter adapter = describeAdapter(*instance, foreign.adapter, 0);
     const uint32_t bits = foreign.family == adapter.families[0]   ? adapter.timestamp_bits[0]
@@ -61,8 +65,12 @@ Expected<std::unique_ptr<Backend>> VulkanDevice::adopt(const ForeignDevice& fore
         return unexpected(makeError(ErrorCode::Unsupported, "device.unsupported", "'{}' lacks {}", adapter.info.name,
                                     adapter.lacking));
     }
-    std::unique_ptr<VulkanDevice> device(
-        new VulkanDevice(std::move(instance), adapter, enabledFeatures(adapter, foreign.features), desc));
+    Enabled enabled = enabledFeatures(adapter, foreign.features);
+    // Glint uses these wherever it may; whether it may here is not known.
+    enabled.features.core.features.occlusionQueryPrecise = VK_FALSE;
+    enabled.features.v12.hostQueryReset = VK_FALSE;
+    // Whoever made the instance hears its messages.
+    std::unique_ptr<VulkanDevice> device(new VulkanDevice(std::move(instance), adapter, enabled, {}));
     device->owned = false;
     device->handle = foreign.device;
     if (Status status = device->createQueues(foreign.queue); !status) return unexpected(status.error());
@@ -98,9 +106,8 @@ Status VulkanDevice::createQueues(VkQueue foreign) {
     const bool addresses = enabled.features.v12.bufferDeviceAddress;
     if (Status status = memory.create(*instance, adapter.handle, handle, addresses); !status) return status;
     constexpr const char* names[queue_count] = {"main time line", "compute time line", "copy time line"};
-    constexpr VkQueueFlags flags[queue_count] = {
-        VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT | VK_QUEUE_TRANSFER_BIT,
-        VK_QUEUE_COMPUTE_BIT | VK_QUEUE_TRANSFER_BIT, VK_QUEUE_TRANSFER_BIT};
+    constexpr VkQueueFlags flags[queue_count] = {VK_QUEUE_GRAPHICS_BIT | VK_QUEUE_COMPUTE_BIT | VK_QUEUE_TRANSFER_BIT,
+                                                 VK_QUEUE_COMPUTE_BIT | VK_QUEUE_TRANSFER_BIT, VK_QUEUE_TRANSFER_BIT};
     for (size_t i = 0; i < queue_count; i++) {
         const uint32_t family = adapter.families[i];
         if (family == no_family) continue;

@@ -45,8 +45,7 @@ struct RawDevice {
 class VulkanDevice final : public detail::Backend, public RawDevice {
 public:
     static Expected<std::unique_ptr<detail::Backend>> create(const detail::BackendDesc& desc);
-    static Expected<std::unique_ptr<detail::Backend>> adopt(const ForeignDevice& foreign,
-                                                            const detail::BackendDesc& desc);
+    static Expected<std::unique_ptr<detail::Backend>> adopt(const ForeignDevice& foreign);
 
     const DeviceInfo& info() const override { return adapter.info; }
     const Features& features() const override { return features_; }
@@ -87,14 +86,14 @@ public:
     // What the objects of this back end use. Constant once the device is there, but for what locks by itself.
     const Adapter adapter;
     const Enabled enabled;
-    std::vector<uint32_t> families;   ///< of the queues, each once
+    std::vector<uint32_t> families;  ///< of the queues, each once
     Memory memory;
     LayoutCache layouts;
     Upload upload;
 
 private:
     VulkanDevice(std::shared_ptr<Instance> instance, const Adapter& adapter, const Enabled& enabled,
-                 const detail::BackendDesc& desc);
+                 const Messenger::Receive& receive);
     Status createDevice();
     Status createQueues(VkQueue foreign);
     void setName(VkObjectType type, uint64_t object, const std::string& name) const;
@@ -102,7 +101,7 @@ private:
     Features features_;
     std::array<std::unique_ptr<VulkanQueue>, detail::queue_count> queues_;
     std::vector<VkSemaphoreSubmitInfo> waits_;
-    mutable std::mutex submit_mutex_;   // lost() looks at the queues while another thread submits
+    mutable std::mutex submit_mutex_;  // lost() looks at the queues while another thread submits
 };
 
 }  // namespace glint::vulkan

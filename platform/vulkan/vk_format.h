@@ -24,7 +24,8 @@ VkShaderStageFlagBits vulkanStage(ShaderStage stage);
 VkShaderStageFlags vulkanStages(ShaderMask stages);
 
 inline VkCompareOp vulkanCompare(Compare compare) {
-    static_assert(VK_COMPARE_OP_NEVER == int(Compare::Never) && VK_COMPARE_OP_LESS_OR_EQUAL == int(Compare::LessEqual) &&
+    static_assert(VK_COMPARE_OP_NEVER == int(Compare::Never) &&
+                  VK_COMPARE_OP_LESS_OR_EQUAL == int(Compare::LessEqual) &&
                   VK_COMPARE_OP_NOT_EQUAL == int(Compare::NotEqual) && VK_COMPARE_OP_ALWAYS == int(Compare::Always));
     return static_cast<VkCompareOp>(compare);
 }

@@ -47,8 +47,8 @@ Error messageError(const VkDebugUtilsMessengerCallbackDataEXT& data) {
 VKAPI_ATTR VkBool32 VKAPI_CALL sendToReceiver(VkDebugUtilsMessageSeverityFlagBitsEXT severity,
                                               VkDebugUtilsMessageTypeFlagsEXT,
                                               const VkDebugUtilsMessengerCallbackDataEXT* data, void* receiver) {
-    (*static_cast<const Messenger::Receive*>(receiver))(
-        messageError(*data), severity < VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT);
+    (*static_cast<const Messenger::Receive*>(receiver))(messageError(*data),
+                                                        severity < VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT);
     return VK_FALSE;
 }
 

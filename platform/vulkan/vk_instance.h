@@ -28,8 +28,8 @@ public:
 
     VkInstance handle = VK_NULL_HANDLE;
     InstanceFunctions vk;
-    bool debug_utils = false;   ///< names, regions and messages
-    bool validation = false;    ///< the Khronos layer is there
+    bool debug_utils = false;  ///< names, regions and messages
+    bool validation = false;   ///< the Khronos layer is there
     bool owned = false;
 
 private:

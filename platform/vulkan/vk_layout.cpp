@@ -158,7 +158,8 @@ Expected<VkDescriptorSet> LayoutCache::acquire(SetLayout& layout) {
     if (layout.free.empty()) {
         const uint32_t count = layout.next_count;
         std::vector<VkDescriptorPoolSize> sizes;
-        for (const SetLayout::Binding& binding : layout.bindings) sizes.push_back({binding.type, binding.count * count});
+        for (const SetLayout::Binding& binding : layout.bindings)
+            sizes.push_back({binding.type, binding.count * count});
         VkDescriptorPoolCreateInfo pool_info = {VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
         pool_info.maxSets = count;
         pool_info.poolSizeCount = static_cast<uint32_t>(sizes.size());

@@ -34,12 +34,12 @@ struct SetLayout {
         bool operator==(const Binding&) const = default;
     };
 
-    std::vector<Binding> bindings;   ///< in order
+    std::vector<Binding> bindings;  ///< in order
     VkDescriptorSetLayout handle = VK_NULL_HANDLE;
-    VkDescriptorUpdateTemplate update = VK_NULL_HANDLE;   ///< DescriptorData of all elements, in order
+    VkDescriptorUpdateTemplate update = VK_NULL_HANDLE;  ///< DescriptorData of all elements, in order
     std::vector<VkDescriptorPool> pools;
     std::vector<VkDescriptorSet> free;
-    uint32_t next_count = 8;         ///< sets of the next pool
+    uint32_t next_count = 8;  ///< sets of the next pool
 };
 
 /// How one element of a binding block becomes a descriptor.
@@ -47,7 +47,7 @@ struct LayoutElement {
     VkDescriptorType type = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
     ImageDimension dimension = ImageDimension::None;
     bool uniform = false;
-    uint32_t size = 0;               ///< uniforms: bytes of the block
+    uint32_t size = 0;  ///< uniforms: bytes of the block
     bool operator==(const LayoutElement&) const = default;
 };
 
@@ -63,7 +63,7 @@ struct PipelineLayout {
 
     std::vector<Set> sets;
     std::vector<LayoutElement> elements;
-    bool dynamic = true;             ///< uniforms have dynamic offsets
+    bool dynamic = true;  ///< uniforms have dynamic offsets
     VkShaderStageFlags push_stages = 0;
     uint32_t push_size = 0;
     VkPipelineLayout handle = VK_NULL_HANDLE;

@@ -30,16 +30,14 @@ namespace glint::vulkan {
 
 namespace {
 
-VKAPI_ATTR void VKAPI_CALL onAllocate(VmaAllocator, uint32_t, VkDeviceMemory, VkDeviceSize size, void* user) {
+VKAPI_ATTR void VKAPI_CALL onAllocate(VmaAllocator, uint32_t, VkDeviceMemory, VkDeviceSize, void* user) {
     Memory& memory = *static_cast<Memory*>(user);
-    memory.bytes += size;
     memory.allocations++;
     memory.objects_created++;
 }
 
-VKAPI_ATTR void VKAPI_CALL onFree(VmaAllocator, uint32_t, VkDeviceMemory, VkDeviceSize size, void* user) {
+VKAPI_ATTR void VKAPI_CALL onFree(VmaAllocator, uint32_t, VkDeviceMemory, VkDeviceSize, void* user) {
     Memory& memory = *static_cast<Memory*>(user);
-    memory.bytes -= size;
     memory.allocations--;
 }
 
@@ -57,9 +55,9 @@ Status Memory::create(const Instance& instance, VkPhysicalDevice adapter, VkDevi
     instance.vk.GetPhysicalDeviceMemoryProperties(adapter, &properties);
     VkDeviceSize largest = 0;
     for (uint32_t i = 0; i < properties.memoryTypeCount; i++) {
-        constexpr VkMemoryPropertyFlags host = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT |
-                                               VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
-                                               VK_MEMORY_PROPERTY_HOST_COHERENT_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+        constexpr VkMemoryPropertyFlags host =
+            VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT | VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
+            VK_MEMORY_PROPERTY_HOST_COHERENT_BIT | VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
         const VkMemoryType& type = properties.memoryTypes[i];
         const VkDeviceSize size = properties.memoryHeaps[type.heapIndex].size;
         if (!(type.propertyFlags & VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT) || size < largest) continue;
@@ -103,8 +101,7 @@ Expected<RawBuffer> Memory::createBuffer(const VkBufferCreateInfo& info, MemoryK
                            VMA_ALLOCATION_CREATE_HOST_ACCESS_ALLOW_TRANSFER_INSTEAD_BIT;
             break;
         case MemoryKind::Upload:
-            wanted.flags =
-                VMA_ALLOCATION_CREATE_MAPPED_BIT | VMA_ALLOCATION_CREATE_HOST_ACCESS_SEQUENTIAL_WRITE_BIT;
+            wanted.flags = VMA_ALLOCATION_CREATE_MAPPED_BIT | VMA_ALLOCATION_CREATE_HOST_ACCESS_SEQUENTIAL_WRITE_BIT;
             wanted.requiredFlags = host;
             break;
         case MemoryKind::Mapped:
@@ -121,6 +118,7 @@ Expected<RawBuffer> Memory::createBuffer(const VkBufferCreateInfo& info, MemoryK
     if (result != VK_SUCCESS) return unexpected(memoryError("vkCreateBuffer", result, info.size));
     objects_created++;
     buffer.memory = allocated.size;
+    bytes += buffer.memory;
     VkMemoryPropertyFlags flags = 0;
     vmaGetAllocationMemoryProperties(allocator_, buffer.allocation, &flags);
     if ((flags & host) == host) buffer.mapped = allocated.pMappedData;
@@ -136,16 +134,23 @@ Expected<RawImage> Memory::createImage(const VkImageCreateInfo& info) {
     if (result != VK_SUCCESS) return unexpected(resultError("vkCreateImage", result));
     objects_created++;
     image.memory = allocated.size;
+    bytes += image.memory;
     return image;
 }
 
 void Memory::destroy(RawBuffer& buffer) {
-    if (buffer.allocation) vmaDestroyBuffer(allocator_, buffer.handle, buffer.allocation);
+    if (buffer.allocation) {
+        vmaDestroyBuffer(allocator_, buffer.handle, buffer.allocation);
+        bytes -= buffer.memory;
+    }
     buffer = {};
 }
 
 void Memory::destroy(RawImage& image) {
-    if (image.allocation) vmaDestroyImage(allocator_, image.handle, image.allocation);
+    if (image.allocation) {
+        vmaDestroyImage(allocator_, image.handle, image.allocation);
+        bytes -= image.memory;
+    }
     image = {};
 }
 

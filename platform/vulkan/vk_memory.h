@@ -50,8 +50,8 @@ public:
     void destroy(RawBuffer& buffer);
     void destroy(RawImage& image);
 
-    std::atomic<uint64_t> bytes = 0;
-    std::atomic<uint64_t> allocations = 0;
+    std::atomic<uint64_t> bytes = 0;  ///< of live buffers and images; the allocator keeps some more for the next ones
+    std::atomic<uint64_t> allocations = 0;  ///< of VkDeviceMemory
     std::atomic<uint64_t> objects_created = 0;
 
 private:

@@ -76,8 +76,12 @@ VkStencilOp stencilOperation(StencilOperation operation) {
 }
 
 VkStencilOpState stencilState(const StencilFace& face, const PipelineDesc& desc) {
-    return {stencilOperation(face.fail),       stencilOperation(face.pass), stencilOperation(face.depth_fail),
-            vulkanCompare(face.compare),       desc.stencil_read_mask,      desc.stencil_write_mask,
+    return {stencilOperation(face.fail),
+            stencilOperation(face.pass),
+            stencilOperation(face.depth_fail),
+            vulkanCompare(face.compare),
+            desc.stencil_read_mask,
+            desc.stencil_write_mask,
             0};
 }
 
@@ -140,8 +144,7 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     raster.depthClampEnable = desc.depth_clamp;
     raster.polygonMode = desc.fill == FillMode::Line ? VK_POLYGON_MODE_LINE : VK_POLYGON_MODE_FILL;
     raster.cullMode = cullMode(desc.cull);
-    raster.frontFace =
-        desc.front == FrontMode::Clockwise ? VK_FRONT_FACE_CLOCKWISE : VK_FRONT_FACE_COUNTER_CLOCKWISE;
+    raster.frontFace = desc.front == FrontMode::Clockwise ? VK_FRONT_FACE_CLOCKWISE : VK_FRONT_FACE_COUNTER_CLOCKWISE;
     raster.depthBiasEnable = desc.depth_bias != 0.0f || desc.depth_slope != 0.0f;
     raster.depthBiasConstantFactor = desc.depth_bias;
     raster.depthBiasSlopeFactor = desc.depth_slope;
@@ -168,8 +171,7 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     blending.pAttachments = blends.data();
 
     constexpr VkDynamicState dynamic_states[] = {VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR,
-                                                 VK_DYNAMIC_STATE_BLEND_CONSTANTS,
-                                                 VK_DYNAMIC_STATE_STENCIL_REFERENCE};
+                                                 VK_DYNAMIC_STATE_BLEND_CONSTANTS, VK_DYNAMIC_STATE_STENCIL_REFERENCE};
     VkPipelineDynamicStateCreateInfo dynamic = {VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO};
     dynamic.dynamicStateCount = static_cast<uint32_t>(std::size(dynamic_states));
     dynamic.pDynamicStates = dynamic_states;

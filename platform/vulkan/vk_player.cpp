@@ -167,7 +167,7 @@ void Player::playCommand(const CommandHeader& header) {
         case CommandType::PushRegion: return pushRegion(list_->at<char>(as<RegionCommand>(header).name));
         case CommandType::PopRegion: return popRegion();
         case CommandType::HostRead:
-        case CommandType::Barrier:   // the tracker has placed their barriers
+        case CommandType::Barrier:  // the tracker has placed their barriers
         case CommandType::Count: return;
     }
 }
@@ -288,8 +288,9 @@ void Player::resetQueries() {
 
 void Player::beginSlot(VulkanQuery& query) {
     query.used++;
-    if (query.used > query.slots()) return;   // the result will say so
-    const bool is_precise = query.type() == Query::TypeSamples && device_.enabled.features.core.features.occlusionQueryPrecise;
+    if (query.used > query.slots()) return;  // the result will say so
+    const bool is_precise =
+        query.type() == Query::TypeSamples && device_.enabled.features.core.features.occlusionQueryPrecise;
     vk_.CmdBeginQuery(commands_, query.pool(), query.used - 1, is_precise ? VK_QUERY_CONTROL_PRECISE_BIT : 0);
 }
 

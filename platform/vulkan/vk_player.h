@@ -35,7 +35,7 @@ private:
         VkPipelineBindPoint point = VK_PIPELINE_BIND_POINT_COMPUTE;
         VkPipeline pipeline = VK_NULL_HANDLE;
         const PipelineLayout* layout = nullptr;
-        const detail::BoundResource* bound = nullptr;   ///< nullptr: no set is bound
+        const detail::BoundResource* bound = nullptr;  ///< nullptr: no set is bound
         const uint32_t* uniforms = nullptr;
         const std::byte* push = nullptr;
         std::vector<VkDescriptorSet> sets;
@@ -118,7 +118,7 @@ private:
     const detail::ResolvedList* resolved_ = nullptr;
     const detail::CommandList* list_ = nullptr;
     const detail::CommandHeader* command_ = nullptr;
-    uint32_t index_ = 0;          ///< of the command
+    uint32_t index_ = 0;  ///< of the command
     size_t next_barrier_ = 0;
     Upload::Region inline_;
     uint32_t region_depth_ = 0;
@@ -130,7 +130,7 @@ private:
     const detail::VertexBinding* vertices_ = nullptr;
     uint32_t index_buffer_ = 0;
     uint64_t index_offset_ = 0;
-    uint32_t index_size_ = 0;     ///< 0: no index buffer is bound
+    uint32_t index_size_ = 0;  ///< 0: no index buffer is bound
     const detail::DynamicState* dynamic_ = nullptr;
 
     std::vector<DescriptorData> descriptors_;

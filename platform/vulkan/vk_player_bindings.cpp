@@ -69,13 +69,12 @@ bool Player::bind(BindPoint& point, const PipelineLayout& layout, const Bindings
         const PipelineLayout::Set& set = layout.sets[i];
         if (set.element_count == 0) continue;
         const bool same_offsets =
-            point.bound && (set.uniform_count == 0 ||
-                            sameBytes(uniforms + set.first_uniform, point.uniforms + set.first_uniform,
-                                  set.uniform_count * sizeof(uint32_t)));
+            point.bound &&
+            (set.uniform_count == 0 || sameBytes(uniforms + set.first_uniform, point.uniforms + set.first_uniform,
+                                                 set.uniform_count * sizeof(uint32_t)));
         // Unchanged parts of a block that was recorded anew keep their sets.
-        const bool same_resources =
-            point.bound && sameBytes(bound + set.first_element, point.bound + set.first_element,
-                                 set.element_count * sizeof(BoundResource));
+        const bool same_resources = point.bound && sameBytes(bound + set.first_element, point.bound + set.first_element,
+                                                             set.element_count * sizeof(BoundResource));
         if (same_resources && same_offsets) continue;
         if (!same_resources || !layout.dynamic) {
             const VkDescriptorSet written = writeSet(layout, set, bound, uniforms);
@@ -160,8 +159,7 @@ bool Player::writeElement(const LayoutElement& element, const BoundResource& bou
     if (element.type == VK_DESCRIPTOR_TYPE_COMBINED_IMAGE_SAMPLER) {
         sampler = static_cast<VulkanSampler*>(list_->resources[bound.second]->native.get())->handle();
     }
-    data.image = {sampler, *view,
-                  is_storage ? VK_IMAGE_LAYOUT_GENERAL : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL};
+    data.image = {sampler, *view, is_storage ? VK_IMAGE_LAYOUT_GENERAL : VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL};
     return true;
 }
 

@@ -69,8 +69,7 @@ void Player::play(const CopyTextureCommand& command) {
     const VulkanTexture& destination = texture(command.destination);
     const bool is_same = source.format() == destination.format();
     VkImageCopy copy = {};
-    copy.srcSubresource =
-        layers(is_same ? source.aspects() : mainAspect(source.desc().format), command.source_slice);
+    copy.srcSubresource = layers(is_same ? source.aspects() : mainAspect(source.desc().format), command.source_slice);
     copy.srcOffset = offset(command.source_region.x, command.source_region.y, command.source_region.z);
     copy.dstSubresource =
         layers(is_same ? destination.aspects() : mainAspect(destination.desc().format), command.destination_slice);

@@ -99,8 +99,8 @@ bool Player::attach(const Attachment& attachment, bool is_depth, bool is_first, 
     if (attachment.texture == none) return true;
     const bool is_last = splits_left_ == 0;
     VulkanTexture& image = texture(attachment.texture);
-    const VkImageLayout layout = is_depth ? VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL
-                                          : VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
+    const VkImageLayout layout =
+        is_depth ? VK_IMAGE_LAYOUT_DEPTH_STENCIL_ATTACHMENT_OPTIMAL : VK_IMAGE_LAYOUT_COLOR_ATTACHMENT_OPTIMAL;
     const VkImageViewType type = target_->layers > 1 ? VK_IMAGE_VIEW_TYPE_2D_ARRAY : VK_IMAGE_VIEW_TYPE_2D;
     Expected<VkImageView> view = image.view(oneMip(attachment.slice, target_->layers), type, image.aspects());
     if (!view) {
@@ -134,7 +134,7 @@ bool Player::attach(const Attachment& attachment, bool is_depth, bool is_first, 
 void Player::setDynamicState(const DynamicState& state) {
     // Negative height turns clip space's +Y up; see vk_pipeline.cpp.
     const Viewport& from = state.viewport;
-    const VkViewport viewport = {from.x,      from.y + from.height, from.width,
+    const VkViewport viewport = {from.x,       from.y + from.height, from.width,
                                  -from.height, from.minimum_depth,   from.maximum_depth};
     vk_.CmdSetViewport(commands_, 0, 1, &viewport);
     const VkRect2D scissor = {{state.scissor.x, state.scissor.y}, {state.scissor.width, state.scissor.height}};
@@ -161,8 +161,8 @@ bool Player::bindDraw(const DrawState& state) {
         vk_.CmdBindVertexBuffers(commands_, 0, count, handles, offsets);
         vertices_ = vertices;
     }
-    const bool same_indices = index_size_ == state.index_size && index_buffer_ == state.index_buffer &&
-                              index_offset_ == state.index_offset;
+    const bool same_indices =
+        index_size_ == state.index_size && index_buffer_ == state.index_buffer && index_offset_ == state.index_offset;
     if (state.index_size && !same_indices) {
         const bool is_inline = state.index_buffer == none;
         vk_.CmdBindIndexBuffer(commands_, is_inline ? inline_.buffer : buffer(state.index_buffer).handle(),

@@ -24,8 +24,8 @@ public:
     /// Result words of a query that is done. Errors: "query.split" (interrupted too often to count), "vulkan.result".
     Expected<std::array<uint64_t, 7>> result() const;
 
-    uint32_t used = 0;              ///< slots that the last recorded use took
-    uint32_t timestamp_bits = 64;   ///< of the queue that the last use went to
+    uint32_t used = 0;             ///< slots that the last recorded use took
+    uint32_t timestamp_bits = 64;  ///< of the queue that the last use went to
 
 private:
     VulkanQuery(VulkanDevice& device, Query::Type type) : device_(device), type_(type) {}

@@ -9,7 +9,11 @@ namespace glint::vulkan {
 
 VulkanQueue::VulkanQueue(VulkanDevice& device, VkQueue handle, uint32_t family, VkQueueFlags flags,
                          uint32_t timestamp_bits)
-    : device_(device), handle_(handle), family_(family), flags_(flags), timestamp_bits_(timestamp_bits),
+    : device_(device),
+      handle_(handle),
+      family_(family),
+      flags_(flags),
+      timestamp_bits_(timestamp_bits),
       player_(device, *this) {}
 
 VulkanQueue::~VulkanQueue() {
@@ -20,7 +24,7 @@ VulkanQueue::~VulkanQueue() {
         info.pValues = &pending_.back()->value;
         device_.vk.WaitSemaphores(device_.handle, &info, UINT64_MAX);
     }
-    for (std::unique_ptr<Frame>& frame : pending_) recycle(std::move(frame));
+    for (std::unique_ptr<Frame>& frame : pending_) finish(std::move(frame));
     for (std::unique_ptr<Frame>& frame : free_) destroy(*frame);
     device_.vk.DestroySemaphore(device_.handle, timeline_, nullptr);
 }
@@ -84,16 +88,20 @@ void VulkanQueue::recycle(std::unique_ptr<Frame> frame) {
     free_.push_back(std::move(frame));
 }
 
+void VulkanQueue::finish(std::unique_ptr<Frame> frame) {
+    if (const VkFence fence = frame->fence) {
+        device_.vk.WaitForFences(device_.handle, 1, &fence, VK_TRUE, UINT64_MAX);
+        device_.vk.ResetFences(device_.handle, 1, &fence);
+    }
+    recycle(std::move(frame));
+}
+
 void VulkanQueue::recycleCompleted() {
     const uint64_t value = completed();
     size_t done = 0;
     for (; done < pending_.size() && pending_[done]->value <= value; done++) {
         last_regions_.swap(pending_[done]->regions);
-        if (const VkFence fence = pending_[done]->fence) {
-            device_.vk.WaitForFences(device_.handle, 1, &fence, VK_TRUE, UINT64_MAX);
-            device_.vk.ResetFences(device_.handle, 1, &fence);
-        }
-        recycle(std::move(pending_[done]));
+        finish(std::move(pending_[done]));
     }
     pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(done));
 }

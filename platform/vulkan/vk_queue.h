@@ -20,7 +20,7 @@ struct Frame {
     uint64_t value = 0;
     std::vector<std::pair<SetLayout*, VkDescriptorSet>> sets;
     std::vector<std::unique_ptr<Chunk>> chunks;
-    std::string regions;   ///< names of the lists and outer regions, for the message of a lost device
+    std::string regions;  ///< names of the lists and outer regions, for the message of a lost device
 };
 
 /// A queue with its time line. All but completed() under the submit lock.
@@ -48,6 +48,7 @@ public:
 private:
     Expected<std::unique_ptr<Frame>> acquire();
     void recycle(std::unique_ptr<Frame> frame);
+    void finish(std::unique_ptr<Frame> frame);
     void destroy(Frame& frame);
     void recycleCompleted();
 
@@ -58,9 +59,9 @@ private:
     const uint32_t timestamp_bits_;
     VkSemaphore timeline_ = VK_NULL_HANDLE;
     Player player_;
-    std::vector<std::unique_ptr<Frame>> pending_;   ///< in order of their values
+    std::vector<std::unique_ptr<Frame>> pending_;  ///< in order of their values
     std::vector<std::unique_ptr<Frame>> free_;
-    std::string last_regions_;                      ///< of the submission that finished last
+    std::string last_regions_;  ///< of the submission that finished last
     mutable std::atomic<uint64_t> last_completed_ = 0;
 };
 

@@ -6,7 +6,8 @@ namespace glint::vulkan {
 
 std::string resultName(VkResult result) {
     switch (result) {
-#define GLINT_VULKAN_NAME(name) case name: return #name;
+#define GLINT_VULKAN_NAME(name) \
+    case name: return #name;
         GLINT_VULKAN_NAME(VK_SUCCESS)
         GLINT_VULKAN_NAME(VK_NOT_READY)
         GLINT_VULKAN_NAME(VK_TIMEOUT)
@@ -46,8 +47,7 @@ Error resultError(const char* call, VkResult result) {
             return makeError(ErrorCode::OutOfMemory, "device.out_of_memory", "{} gave {}", call, resultName(result));
         case VK_ERROR_DEVICE_LOST:
             return makeError(ErrorCode::DeviceLost, "device.lost", "{} gave {}", call, resultName(result));
-        default:
-            return makeError(ErrorCode::Internal, "vulkan.result", "{} gave {}", call, resultName(result));
+        default: return makeError(ErrorCode::Internal, "vulkan.result", "{} gave {}", call, resultName(result));
     }
 }
 

@@ -43,8 +43,8 @@ Expected<std::unique_ptr<VulkanSampler>> VulkanSampler::create(VulkanDevice& dev
     if (desc.reduction != Sampler::ReductionAverage) info.pNext = &reduction;
     info.magFilter = is_point ? VK_FILTER_NEAREST : VK_FILTER_LINEAR;
     info.minFilter = info.magFilter;
-    info.mipmapMode = desc.filter == Sampler::FilterTrilinear ? VK_SAMPLER_MIPMAP_MODE_LINEAR
-                                                              : VK_SAMPLER_MIPMAP_MODE_NEAREST;
+    info.mipmapMode =
+        desc.filter == Sampler::FilterTrilinear ? VK_SAMPLER_MIPMAP_MODE_LINEAR : VK_SAMPLER_MIPMAP_MODE_NEAREST;
     info.addressModeU = info.addressModeV = info.addressModeW = addressMode(desc.wrap);
     info.anisotropyEnable = desc.anisotropy > 1;
     info.maxAnisotropy = static_cast<float>(desc.anisotropy);

@@ -83,7 +83,10 @@ uint32_t textureSupport(const VulkanDevice& device, Format format, Texture::Type
 }
 
 VulkanTexture::VulkanTexture(VulkanDevice& device, const TextureDesc& desc, uint32_t samples)
-    : device_(device), desc_(desc), samples_(samples), format_(vulkanFormat(desc.format)),
+    : device_(device),
+      desc_(desc),
+      samples_(samples),
+      format_(vulkanFormat(desc.format)),
       aspects_(formatAspects(desc.format)),
       is_filterable_((formatFeatures(device, desc.format) & VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT) != 0 &&
                      !formatInfo(desc.format).depth) {}

@@ -90,8 +90,8 @@ Expected<std::unique_ptr<VulkanTracing>> VulkanTracing::create(VulkanDevice& dev
         const VkAccelerationStructureBuildGeometryInfoKHR info = tracing->buildInfo();
         VkAccelerationStructureBuildSizesInfoKHR sizes = {
             VK_STRUCTURE_TYPE_ACCELERATION_STRUCTURE_BUILD_SIZES_INFO_KHR};
-        device.vk.GetAccelerationStructureBuildSizesKHR(
-            device.handle, VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR, &info, counts.data(), &sizes);
+        device.vk.GetAccelerationStructureBuildSizesKHR(device.handle, VK_ACCELERATION_STRUCTURE_BUILD_TYPE_DEVICE_KHR,
+                                                        &info, counts.data(), &sizes);
         size = sizes.accelerationStructureSize;
         // Room for any offset: the player aligns the address.
         const uint64_t alignment = device.features().scratchAlignment;

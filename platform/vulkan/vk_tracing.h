@@ -37,7 +37,7 @@ private:
     Tracing::Type type_ = Tracing::TypeTriangle;
     Tracing::Flags flags_ = 0;
     std::vector<detail::TracingGeometry> geometries_;
-    std::vector<VkAccelerationStructureGeometryKHR> native_;   ///< addresses are filled in for a build
+    std::vector<VkAccelerationStructureGeometryKHR> native_;  ///< addresses are filled in for a build
     std::vector<VkAccelerationStructureBuildRangeInfoKHR> ranges_;
     RawBuffer storage_;
     VkAccelerationStructureKHR handle_ = VK_NULL_HANDLE;

@@ -20,7 +20,7 @@ class Upload {
 public:
     struct Region {
         VkBuffer buffer = VK_NULL_HANDLE;
-        uint64_t offset = 0;   ///< a multiple of 256, which is the largest alignment Vulkan lets a driver ask for
+        uint64_t offset = 0;  ///< a multiple of 256, which is the largest alignment Vulkan lets a driver ask for
     };
 
     Upload(Memory& memory, std::span<const uint32_t> families) : memory_(memory), families_(families) {}

@@ -85,7 +85,9 @@ double Times::minimum() const { return *std::min_element(values.begin(), values.
 std::vector<Times> interleave(std::span<const Side> sides, uint32_t warm_up, uint32_t rounds) {
     std::vector<Times> times(sides.size());
     for (uint32_t round = 0; round < warm_up + rounds; round++) {
-        for (size_t i = 0; i < sides.size(); i++) {
+        for (size_t turn = 0; turn < sides.size(); turn++) {
+            // To and fro, so that no side always finds the caches as the same other has left them.
+            const size_t i = round % 2 == 0 ? turn : sides.size() - 1 - turn;
             const double begin = threadSeconds();
             sides[i].timed();
             const double end = threadSeconds();

@@ -89,7 +89,7 @@ struct Side {
     std::function<void()> untimed;  ///< after each timed part, such as the wait for the device
 };
 
-/// Runs all sides in turn, `warm_up` + `rounds` times, and returns the calling thread's seconds of each.
+/// Runs all sides `warm_up` + `rounds` times, in turn and in reverse, and returns the calling thread's seconds of each.
 std::vector<Times> interleave(std::span<const Side> sides, uint32_t warm_up, uint32_t rounds);
 
 /// "label    median 1.234 ms  minimum 1.200 ms"

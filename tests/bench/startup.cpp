@@ -130,6 +130,10 @@ void run(Report& report) {
         twin_times.values.push_back(twin_run.picture);
         twin_exits.values.push_back(twin_run.exit);
     }
+    const Image glint_image = *check(Image::load(glint_picture));
+    const Image twin_image = *check(Image::load(twin_picture));
+    if (!std::ranges::equal(glint_image.bytes(), twin_image.bytes()))
+        throw std::runtime_error("the programs drew different pictures");
     printTimes("Glint, to the picture", glint_times);
     printTimes("Vulkan, to the picture", twin_times);
     printTimes("Glint, to the exit", glint_exits);

@@ -21,6 +21,11 @@ struct Vertex {
     float color[4];
 };
 
+struct Parameters {
+    float scale[2];
+    float rotation[2];  // cosine and sine
+};
+
 constexpr std::array<Vertex, 3> vertices = {{
     {{1.0f, -1.0f}, {1.0f, 0.0f, 0.0f, 1.0f}},
     {{-1.0f, -1.0f}, {0.0f, 1.0f, 0.0f, 1.0f}},
@@ -60,8 +65,11 @@ void draw(std::span<char* const> arguments) {
         VkVertexInputAttributeDescription{0, 0, VK_FORMAT_R32G32_SFLOAT, offsetof(Vertex, position)},
         VkVertexInputAttributeDescription{1, 0, VK_FORMAT_R32G32B32A32_SFLOAT, offsetof(Vertex, color)},
     };
+    constexpr VkDescriptorSetLayoutBinding binding = {0, VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER, 1,
+                                                      VK_SHADER_STAGE_VERTEX_BIT};
     const RawProgram pipeline = device.createPipeline({.vertex = vertex,
                                                        .fragment = fragment,
+                                                       .bindings = std::span(&binding, 1),
                                                        .attributes = attributes,
                                                        .stride = sizeof(Vertex),
                                                        .color_format = VK_FORMAT_R8G8B8A8_UNORM});
@@ -69,6 +77,18 @@ void draw(std::span<char* const> arguments) {
                                                VK_IMAGE_USAGE_COLOR_ATTACHMENT_BIT | VK_IMAGE_USAGE_TRANSFER_SRC_BIT);
     const RawBuffer triangle = device.createBuffer(sizeof(vertices), VK_BUFFER_USAGE_VERTEX_BUFFER_BIT, true);
     std::memcpy(triangle.mapped, vertices.data(), sizeof(vertices));
+    const RawBuffer uniforms = device.createBuffer(sizeof(Parameters), VK_BUFFER_USAGE_UNIFORM_BUFFER_BIT, true);
+    const float aspect = static_cast<float>(width) / static_cast<float>(height);
+    const Parameters parameters = {{0.75f / aspect, 0.75f}, {1.0f, 0.0f}};
+    std::memcpy(uniforms.mapped, &parameters, sizeof(parameters));
+    const VkDescriptorSet set = device.createSets(pipeline, std::span(&binding, 1), 1)[0];
+    const VkDescriptorBufferInfo uniform_info = {uniforms.buffer, 0, sizeof(Parameters)};
+    VkWriteDescriptorSet write = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
+    write.dstSet = set;
+    write.descriptorCount = 1;
+    write.descriptorType = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
+    write.pBufferInfo = &uniform_info;
+    vk.UpdateDescriptorSets(device.handle(), 1, &write, 0, nullptr);
     const RawBuffer pixels =
         device.createBuffer(VkDeviceSize{4} * width * height, VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
 
@@ -98,6 +118,7 @@ void draw(std::span<char* const> arguments) {
     vk.CmdSetViewport(commands, 0, 1, &viewport);
     vk.CmdSetScissor(commands, 0, 1, &scissor);
     vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline.pipeline);
+    vk.CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_GRAPHICS, pipeline.layout, 0, 1, &set, 0, nullptr);
     vk.CmdBindVertexBuffers(commands, 0, 1, &triangle.buffer, &offset);
     vk.CmdDraw(commands, 3, 1, 0, 0);
     vk.CmdEndRendering(commands);

@@ -226,9 +226,12 @@ Status Device::submit(std::initializer_list<SubmitItem> items, const Fence& fenc
     DeviceObject* object = opened(*this);
     if (!object) return error().at(where);
     constexpr size_t limit = 64;
-    if (items.size() > limit)
-        return makeError(where, ErrorCode::OutOfRange, "submit.count", "submit: {} recorders, the limit is {}",
-                         items.size(), limit);
+    if (items.size() > limit) {
+        const Error many = makeError(where, ErrorCode::OutOfRange, "submit.count",
+                                     "submit: {} recorders, the limit is {}", items.size(), limit);
+        object->report(many);
+        return many;
+    }
     RecorderCore* recorders[limit];
     size_t count = 0;
     for (const SubmitItem& item : items) {

@@ -130,6 +130,8 @@ Expected<std::unique_ptr<Native>> PipelineObject::createNative(const Stages& sta
     const Reflection& vertex = *stages.find(ShaderStage::Vertex);
     PipelineDesc complete = desc;
     complete.blends.resize(complete.color_formats.size());
+    for (size_t i = 0; i < complete.blends.size(); i++)
+        if (complete.color_formats[i] == FormatUnknown) complete.blends[i].write_mask = 0;
     complete.depth_write = complete.depth_write && complete.depth_test;
     complete.layout = &layout;
     complete.name = name();

@@ -29,7 +29,7 @@ public:
         PrimitiveLineStrip,
         PrimitiveTriangle,
         PrimitiveTriangleStrip,
-        PrimitivePatch,
+        PrimitivePatch,  ///< of three vertices; needs control and evaluate shaders
     };
     enum FillModeType : uint8_t { FillModeSolid, FillModeLine };
     enum CullModeType : uint8_t { CullModeNone, CullModeBack, CullModeFront };

@@ -438,7 +438,7 @@ const BindingLayout& Program::getLayout() const {
 
 bool Program::load(Shader shader, Where where) {
     setShader(shader, where);
-    return static_cast<bool>(shader) && state() != ObjectState::Failed;
+    return static_cast<bool>(shader) && state() == ObjectState::Building;
 }
 
 void Program::declareSlots(SlotKind kind, uint32_t first, uint32_t count, ShaderMask mask, Where where) {

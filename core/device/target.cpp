@@ -27,6 +27,11 @@ void attach(TargetObject& target, detail::Ref<TextureObject>& place, Slice& plac
         return;
     }
     auto* object = static_cast<TextureObject*>(texture.object());
+    if (object->device() != target.device()) {
+        target.fail(makeError(where, ErrorCode::InvalidArgument, "handle.device", "{}: {} belongs to another device",
+                              target.label(), object->label()));
+        return;
+    }
     const FormatInfo& info = formatInfo(object->desc.format);
     if (!(object->desc.flags & Texture::FlagTarget)) {
         target.fail(makeError(where, ErrorCode::InvalidArgument, "target.flag",

@@ -168,16 +168,20 @@ TEST_F(BufferTest, ReleaseBeforeUseIsOver) {
 }
 
 TEST_F(BufferTest, MemoryComesBack) {
-    ASSERT_THAT(device.finish(), IsOk());
-    const DeviceMemory before = device.getMemory();
-    {
-        std::vector<Buffer> buffers;
-        for (int i = 0; i < 8; i++) buffers.push_back(device.createBuffer(Buffer::FlagStorage, 8 << 20));
-        EXPECT_GE(device.getMemory().bytes, before.bytes + (64u << 20));
-        EXPECT_GE(device.getMemory().objects_created, before.objects_created + 8);
+    // The allocator may keep a block for the next object, but not more with each round.
+    uint64_t after_first = 0;
+    for (int round = 0; round < 4; round++) {
+        const uint64_t created = device.getMemory().objects_created;
+        {
+            std::vector<Buffer> buffers;
+            for (int i = 0; i < 8; i++) buffers.push_back(device.createBuffer(Buffer::FlagStorage, 8 << 20));
+            EXPECT_GE(device.getMemory().bytes, 64u << 20);
+            EXPECT_GE(device.getMemory().objects_created, created + 8);
+        }
+        ASSERT_THAT(device.finish(), IsOk());
+        if (round == 0) after_first = device.getMemory().bytes;
     }
-    ASSERT_THAT(device.finish(), IsOk());
-    EXPECT_LE(device.getMemory().bytes, before.bytes);
+    EXPECT_LE(device.getMemory().bytes, after_first);
 }
 
 TEST_F(BufferTest, ManyThreadsCreateAndRelease) {

@@ -155,8 +155,10 @@ TEST_F(KernelTest, ManyInTheBackground) {
 
 TEST_F(KernelTest, BackgroundFailureIsCarried) {
     Kernel kernel = device.createKernel();
-    kernel.createAsync();
-    expectError("program.stage", [&] { return kernel.wait(); });
+    expectError("program.stage", [&] {
+        kernel.createAsync();
+        return kernel.wait();
+    });
     EXPECT_EQ(kernel.state(), ObjectState::Failed);
 }
 

@@ -377,11 +377,11 @@ TEST_F(TracingTest, FirstHitIsSomeHit) {
 }
 
 TEST_F(TracingTest, FacingIsThatOfTheObject) {
-    // Clockwise, seen from +Z, where the rays come from: the front of a triangle.
-    Mesh clockwise;
-    clockwise.positions = {{-1, -1, 0}, {0, 1, 0}, {1, -1, 0}};
-    clockwise.indices = {0, 1, 2};
-    const Tracing triangle = bottom({&clockwise});
+    // Counter-clockwise seen from +Z, where the first ray comes from: its front.
+    Mesh facing;
+    facing.positions = {{-1, -1, 0}, {1, -1, 0}, {0, 1, 0}};
+    facing.indices = {0, 1, 2};
+    const Tracing triangle = bottom({&facing});
     const std::vector<Ray> cast = {{{0, 0, 5}, 0xff, {0, 0, -1}, 100}, {{0, 0, -5}, 0xff, {0, 0, 1}, 100}};
     const auto kinds = [&](uint32_t instance_flags, uint32_t ray_flags, const Matrix4x4f& transform) {
         Tracing::Instance one = instance(triangle, transform);

@@ -170,7 +170,7 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
             if (recorder->device() != this)
                 error = makeError(where, ErrorCode::InvalidArgument, "handle.device",
                                   "submit: the recorder '{}' belongs to another device", recorder->list().label);
-            else if (recorder->submitted)
+            else if (recorder->submitted || std::count(recorders.begin(), recorders.end(), recorder) > 1)
                 error = makeError(where, ErrorCode::InvalidArgument, "submit.twice",
                                   "submit: the recorder '{}' has been submitted already", recorder->list().label);
             else if (recorder->queue() != queue)

@@ -38,6 +38,7 @@ void Object::retain() {
 
 void Object::release() {
     if (users_.fetch_sub(1, std::memory_order_acq_rel) != 1) return;
+    lastRelease();
     DeviceObject* const device = device_;
     unhold();
     if (device) device->unhold();

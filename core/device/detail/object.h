@@ -89,7 +89,7 @@ public:
 
 protected:
     virtual ~Object();
-    /// Nothing refers to the object any more; it is still whole.
+    /// No handle refers to the object any more; it is still whole.
     virtual void lastRelease() {}
 
 private:

@@ -76,7 +76,6 @@ RecorderCore::Bound* RecorderCore::bind(SlotKind kind, const Slot& slot, uint32_
     if (static_cast<size_t>(index) >= slots.size()) slots.resize(static_cast<size_t>(index) + 1);
     Bound& bound = slots[static_cast<size_t>(index)];
     if (!array) return &bound;
-    bound.set = true;
     bound.elements.resize(resource->count);
     return &bound.elements[step];
 }

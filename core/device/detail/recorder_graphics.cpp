@@ -237,13 +237,17 @@ bool RecorderCore::flushDraw(bool indexed, DrawState& state, Where where) {
     if (vertices_dirty_) {
         VertexBinding bindings[std::tuple_size_v<decltype(vertices_)>];
         const size_t count = std::min(desc.vertex_buffers.size(), vertices_.size());
+        // A slot that no attribute reads (stride 0) gets what the first one that is read has.
+        size_t first = 0;
+        while (first < count && desc.vertex_buffers[first].stride == 0) first++;
         for (size_t i = 0; i < count; i++) {
-            if (!vertices_[i].set) {
+            const size_t slot = desc.vertex_buffers[i].stride ? i : first;
+            if (!vertices_[slot].set) {
                 fail(where, ErrorCode::InvalidArgument, "draw.vertices",
-                     "draw: vertex buffer {} of {} has not been set", i, program_->label());
+                     "draw: vertex buffer {} of {} has not been set", slot, program_->label());
                 return false;
             }
-            bindings[i] = {vertices_[i].buffer, vertices_[i].offset};
+            bindings[i] = {vertices_[slot].buffer, vertices_[slot].offset};
         }
         vertex_block_count_ = static_cast<uint32_t>(count);
         vertex_block_ = count ? append(bindings, count * sizeof(VertexBinding)) : none;

@@ -79,7 +79,7 @@ protected:
                     case 1: words[at] ^= 1u << below(32); break;
                     case 2: words[at] = tempting[below(std::size(tempting))]; break;
                     case 3: words[at] = words[below(words.size())]; break;
-                    case 4: words[at] = 1 + static_cast<uint32_t>(below(words[3])); break;
+                    case 4: words[at] = 1 + static_cast<uint32_t>(below(good[3])); break;
                     case 5:
                         words.erase(words.begin() + at, words.begin() + std::min(words.size(), at + 1 + below(6)));
                         break;

@@ -181,6 +181,8 @@ Expected<VkDescriptorSet> LayoutCache::acquire(SetLayout& layout) {
         }
         layout.pools.push_back(pool);
         layout.next_count = std::min(count * 2, 1024u);
+        layout.count += count;
+        layout.free.reserve(layout.count);  // all may be free at once one day; recycling allocates nothing
         device_.memory.objects_created += 1 + count;
     }
     const VkDescriptorSet set = layout.free.back();

@@ -40,6 +40,7 @@ struct SetLayout {
     std::vector<VkDescriptorPool> pools;
     std::vector<VkDescriptorSet> free;
     uint32_t next_count = 8;  ///< sets of the next pool
+    size_t count = 0;         ///< sets, free or in use
 };
 
 /// How one element of a binding block becomes a descriptor.

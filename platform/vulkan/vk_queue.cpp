@@ -65,6 +65,9 @@ Expected<std::unique_ptr<Frame>> VulkanQueue::acquire() {
         return unexpected(resultError("vkAllocateCommandBuffers", result));
     }
     device_.memory.objects_created += 2;
+    // All may be pending, or free, at once one day: room for that now, so that a warm frame never allocates it.
+    pending_.reserve(pending_.size() + 1);
+    free_.reserve(pending_.size() + 1);
     if (device_.instance->validation) {
         const VkFenceCreateInfo fence_info = {VK_STRUCTURE_TYPE_FENCE_CREATE_INFO, nullptr, 0};
         result = device_.vk.CreateFence(device_.handle, &fence_info, nullptr, &frame->fence);

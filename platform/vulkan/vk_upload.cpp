@@ -41,6 +41,7 @@ Expected<std::unique_ptr<Chunk>> Upload::acquire(uint64_t size) {
     Expected<RawBuffer> buffer = memory_.createBuffer(info, MemoryKind::Upload);
     if (!buffer) return unexpected(buffer.error());
     chunk->buffer = *buffer;
+    free_.reserve(++chunk_count_);  // all may be free at once one day; recycling allocates nothing
     return chunk;
 }
 
@@ -62,6 +63,7 @@ void Upload::recycle(std::vector<std::unique_ptr<Chunk>>& chunks) {
         chunk->used = 0;
         if (chunk->size > largest_kept) {
             memory_.destroy(chunk->buffer);
+            chunk_count_--;
         } else {
             free_.push_back(std::move(chunk));
         }

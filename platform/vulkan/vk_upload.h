@@ -38,6 +38,7 @@ private:
     Memory& memory_;
     const std::span<const uint32_t> families_;
     std::vector<std::unique_ptr<Chunk>> free_;
+    size_t chunk_count_ = 0;  ///< free or in use
 };
 
 /// The sharing mode of buffers and images: concurrent if the device's queues are of several families.

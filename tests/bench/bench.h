@@ -28,7 +28,6 @@ struct Options {
     std::string filter;
     std::filesystem::path json = "out/figures.json";
     bool list = false;
-    bool long_runs = false;
 };
 
 /// Collects the figures of one run of the program.

@@ -9,10 +9,9 @@ namespace {
 
 using namespace glint::bench;
 
-constexpr const char* usage = "bench [NAME] [--list] [--long] [--json FILE]\n"
+constexpr const char* usage = "bench [NAME] [--list] [--json FILE]\n"
                               "  NAME     run the benchmarks that make a figure whose name holds NAME\n"
                               "  --list   print the figures\n"
-                              "  --long   also what takes minutes\n"
                               "  --json   file of figures, out/figures.json by default\n";
 
 bool parse(int argc, char** argv, Options& options) {
@@ -20,8 +19,6 @@ bool parse(int argc, char** argv, Options& options) {
         const std::string_view argument = argv[i];
         if (argument == "--list") {
             options.list = true;
-        } else if (argument == "--long") {
-            options.long_runs = true;
         } else if (argument == "--json" && i + 1 < argc) {
             options.json = argv[++i];
         } else if (!argument.starts_with("-") && options.filter.empty()) {

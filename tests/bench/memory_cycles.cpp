@@ -100,7 +100,6 @@ struct Scene {
 struct Class {
     std::string name;
     std::function<void()> cycle;
-    bool slow = false;
 };
 
 std::vector<Class> classes(Scene& scene) {
@@ -174,7 +173,7 @@ void run(Report& report) {
     for (const Class& each : classes(scene)) {
         const std::string full = std::string(figure) + "." + each.name;
         const std::string& filter = report.options().filter;
-        if (full.find(filter) == std::string::npos || (each.slow && !report.options().long_runs)) {
+        if (full.find(filter) == std::string::npos) {
             complete = false;
             continue;
         }

@@ -446,6 +446,15 @@ TEST_F(TracingTest, CompactionKeepsTheHits) {
     EXPECT_THAT(device.buildTracings({ball, ring, scene}, Tracing::FlagCompact), IsOk());
     EXPECT_LE(ball.getMemory() + ring.getMemory(), before);
     EXPECT_GT(ball.getMemory(), 0u);
+    // Whoever still refers to where the structures were will find this instead.
+    EXPECT_THAT(device.finish(), IsOk());
+    std::vector<Buffer> rubbish;
+    for (uint64_t size = 4096; size <= 1 << 18; size *= 2)
+        for (int i = 0; i < 4; i++) {
+            rubbish.push_back(device.createBuffer(Buffer::FlagStorage | Buffer::FlagScratch, size));
+            device.clearBuffer(rubbish.back(), 0xffffffff);
+        }
+    EXPECT_THAT(device.finish(), IsOk());
     expectAgreement(trace(scene, cast), {{{&sphere}}, {{&torus}, moved}}, cast);
     // A top level made of compacted ones.
     const Tracing other = device.createTracing({instance(ring)});

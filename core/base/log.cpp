@@ -13,7 +13,8 @@ struct Receiver {
 };
 
 Receiver& receiver() {
-    static Receiver instance;
+    // Never destroyed: threads may log while the program exits.
+    static Receiver& instance = *new Receiver;
     return instance;
 }
 

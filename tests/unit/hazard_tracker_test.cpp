@@ -59,6 +59,13 @@ layout(local_size_x = 8) in;
 layout(binding = 0, rgba8) uniform image2D surface;
 void main() { imageStore(surface, ivec2(0), imageLoad(surface, ivec2(1)) * 2.0); })";
 
+constexpr const char* gather_kernel = R"(
+layout(local_size_x = 8) in;
+layout(binding = 0) uniform Parameters { uvec4 parameters[4]; };
+layout(binding = 1) uniform utextureBuffer texels;
+layout(binding = 2) writeonly buffer To { uvec4 to[]; };
+void main() { to[gl_GlobalInvocationID.x] = parameters[1] + texelFetch(texels, 0); })";
+
 constexpr const char* address_kernel = R"(
 layout(local_size_x = 8) in;
 layout(buffer_reference, std430) buffer Values { uint values[]; };
@@ -82,6 +89,35 @@ void main() { gl_Position = position; })";
 constexpr const char* reading_vertex = R"(
 layout(binding = 0) readonly buffer Positions { vec4 positions[]; };
 void main() { gl_Position = positions[gl_VertexIndex]; })";
+
+// Writes to slot 1, which comes after the fragment shader's slot 0.
+constexpr const char* writing_vertex = R"(
+layout(binding = 4) buffer Count { uint count; };
+void main() { gl_Position = vec4(float(atomicAdd(count, 1u))); })";
+
+constexpr const char* reading_fragment = R"(
+layout(binding = 3) readonly buffer Colors { vec4 colors[]; };
+layout(location = 0) out vec4 color;
+void main() { color = colors[0]; })";
+
+// One block in both stages.
+constexpr const char* counting_vertex = R"(
+layout(binding = 5) buffer Count { uint count; };
+void main() { gl_Position = vec4(float(atomicAdd(count, 1u))); })";
+
+constexpr const char* counting_fragment = R"(
+layout(binding = 5) buffer Count { uint count; };
+layout(location = 0) out vec4 color;
+void main() { color = vec4(float(atomicAdd(count, 1u))); })";
+
+constexpr const char* painting_vertex = R"(
+layout(binding = 6, rgba8) uniform image2D surface;
+void main() { gl_Position = imageLoad(surface, ivec2(0)); imageStore(surface, ivec2(1), gl_Position); })";
+
+constexpr const char* painting_fragment = R"(
+layout(binding = 6, rgba8) uniform image2D surface;
+layout(location = 0) out vec4 color;
+void main() { color = imageLoad(surface, ivec2(0)); imageStore(surface, ivec2(1), color); })";
 
 constexpr const char* plain_fragment = R"(
 layout(location = 0) out vec4 color;
@@ -111,48 +147,57 @@ struct Programs {
         sample = kernel(sample_kernel);
         store = kernel(store_kernel);
         paint = kernel(paint_kernel);
+        gather = kernel(gather_kernel);
         address = kernel(address_kernel);
         trace = kernel(trace_kernel);
         sampler = device.createSampler();
-        for (const char* vertex : {plain_vertex, reading_vertex}) {
-            for (const char* fragment : {plain_fragment, sampling_fragment, storing_fragment}) {
-                for (const bool depth : {false, true}) {
-                    Pipeline pipeline = device.createPipeline();
-                    pipeline.createShaderGLSL(Shader::TypeVertex, vertex);
-                    pipeline.createShaderGLSL(Shader::TypeFragment, fragment);
-                    pipeline.setColorFormat(FormatRGBAu8n);
-                    if (depth) {
-                        pipeline.setDepthFormat(FormatDf32);
-                        pipeline.setDepthFunc(Pipeline::DepthFuncLess);
-                    }
-                    if (vertex == plain_vertex)
-                        pipeline.addAttribute(Pipeline::AttributePosition, FormatRGBAf32, 0, 0, 16);
-                    EXPECT_THAT(pipeline.create(), IsOk());
-                    draws.push_back({pipeline, vertex == plain_vertex, fragment == sampling_fragment,
-                                     fragment == storing_fragment, depth});
+        const std::pair<const char*, const char*> stages[] = {
+            {plain_vertex, plain_fragment},      {plain_vertex, sampling_fragment},
+            {plain_vertex, storing_fragment},    {reading_vertex, plain_fragment},
+            {reading_vertex, sampling_fragment}, {reading_vertex, storing_fragment},
+            {writing_vertex, reading_fragment},  {counting_vertex, counting_fragment},
+            {painting_vertex, painting_fragment}, {painting_vertex, sampling_fragment},
+        };
+        for (const auto& [vertex, fragment] : stages) {
+            for (const bool depth : {false, true}) {
+                Pipeline pipeline = device.createPipeline();
+                pipeline.createShaderGLSL(Shader::TypeVertex, vertex);
+                pipeline.createShaderGLSL(Shader::TypeFragment, fragment);
+                pipeline.setColorFormat(FormatRGBAu8n);
+                if (depth) {
+                    pipeline.setDepthFormat(FormatDf32);
+                    pipeline.setDepthFunc(Pipeline::DepthFuncLess);
                 }
+                const bool fetches = vertex == plain_vertex;
+                if (fetches) pipeline.addAttribute(Pipeline::AttributePosition, FormatRGBAf32, 0, 0, 16);
+                EXPECT_THAT(pipeline.create(), IsOk());
+                draws.push_back({pipeline, pipeline.getSlots(SlotKind::Storage), fetches,
+                                 pipeline.getSlots(SlotKind::Texture) > 0, pipeline.getSlots(SlotKind::Surface) > 0});
             }
         }
     }
 
     struct DrawProgram {
         Pipeline pipeline;
-        bool fetches, samples, stores, has_depth;
+        uint32_t storages;
+        bool fetches, samples, paints;
     };
-    Kernel copy, change, sample, store, paint, address, trace;
+    Kernel copy, change, sample, store, paint, gather, address, trace;
     Sampler sampler;
-    std::vector<DrawProgram> draws;
+    std::vector<DrawProgram> draws;  ///< each without and with depth
 };
 
 // A random program: resources, and submissions to the three queues that use them.
 
 class RandomProgram {
 public:
-    RandomProgram(Device& device, const Programs& programs, uint64_t seed)
-        : device_(device), programs_(programs), random_(seed) {
+    /// With `may_fail` submissions may run out of memory.
+    RandomProgram(Device& device, const Programs& programs, uint64_t seed, bool may_fail = false)
+        : device_(device), programs_(programs), random_(seed), may_fail_(may_fail) {
         for (size_t i = 0; i < buffers_.size(); i++) {
             constexpr Buffer::Flags flags = Buffer::FlagStorage | Buffer::FlagVertex | Buffer::FlagIndex |
-                                            Buffer::FlagIndirect | Buffer::FlagAddress;
+                                            Buffer::FlagIndirect | Buffer::FlagAddress | Buffer::FlagUniform |
+                                            Buffer::FlagTexel;
             buffers_[i] = device.createBuffer(flags, buffer_size, "buffer " + std::to_string(i));
         }
         TextureDesc desc;
@@ -165,6 +210,8 @@ public:
         desc.flags = Texture::FlagTarget | Texture::FlagSurface;
         textures_[1] = device.createTexture(desc, "picture");
         depth_ = device.createTexture2D(FormatDf32, 8, 8, Texture::FlagTarget, "depth");
+        fine_ = device.createTexture2D(FormatRGBAu8n, 8, 8, Texture::FlagTarget | Texture::FlagMultisample4, "fine");
+        time_ = device.createQuery(Query::TypeTime, "time");
         vertices_ = device.createBuffer(Buffer::FlagTracing | Buffer::FlagStorage, 36 * 4, "vertices");
         for (size_t i = 0; i < bottoms_.size(); i++) {
             bottoms_[i] = device.createTracing("bottom " + std::to_string(i));
@@ -177,7 +224,7 @@ public:
     }
 
     void run() {
-        EXPECT_THAT(device_.buildTracings({bottoms_[0], bottoms_[1]}), IsOk());
+        accept(device_.buildTracings({bottoms_[0], bottoms_[1]}));
         buildTop();
         for (size_t i = 2 + below(4); i > 0; i--) submit();
         // Whatever was written is read in the end: a barrier that is missing shows.
@@ -189,13 +236,18 @@ public:
                 last.copyTextureToBuffer(sink, 0, texture, {mip, 1, 0, 0});
         last.setKernel(programs_.trace);
         last.setTracing(0, top_);
-        last.setStorageBuffer(1 - 1, buffers_[0]);
+        last.setStorageBuffer(0, buffers_[0]);
         last.dispatch(8);
-        EXPECT_THAT(device_.submit(last), IsOk());
+        accept(device_.submit(last));
     }
 
 private:
     static constexpr uint64_t buffer_size = 1024;
+
+    void accept(const Status& status) {
+        if (may_fail_ && status.error().id() == "device.out_of_memory") return;
+        EXPECT_THAT(status, IsOk());
+    }
 
     uint64_t below(uint64_t count) { return random_.below(count); }
     const Buffer& buffer() { return buffers_[below(buffers_.size())]; }
@@ -215,7 +267,7 @@ private:
         const Tracing::Instance all[] = {{.tracing = &bottoms_[below(2)]}, {.tracing = &bottoms_[below(2)]}, {}};
         device_.setTracing(top_, std::span(all).first(1 + below(3)));
         device_.buildTracing(top_);
-        EXPECT_THAT(device_.flush(), IsOk());
+        accept(device_.flush());
     }
 
     void submit() {
@@ -229,7 +281,8 @@ private:
         commands.reserve(3);
         for (size_t i = 1 + below(3); i > 0; i--) {
             if (queue == Queue::Main && below(2) == 0) {
-                if (record(commands)) order.push_back(10 + commands.size() - 1);
+                record(commands);
+                order.push_back(10 + commands.size() - 1);
             } else {
                 record(computes, queue);
                 order.push_back(computes.size() - 1);
@@ -242,7 +295,7 @@ private:
         if (order.size() == 1) status = device_.submit({item(0)});
         if (order.size() == 2) status = device_.submit({item(0), item(1)});
         if (order.size() == 3) status = device_.submit({item(0), item(1), item(2)});
-        EXPECT_THAT(status, IsOk());
+        accept(status);
     }
 
     void transfer() {
@@ -260,17 +313,19 @@ private:
         Compute& list = computes.back();
         const bool tracked = below(8) != 0;
         if (!tracked) list.setTracking(false);
+        const bool timed = queue == Queue::Main && below(8) == 0;
+        if (timed) list.beginQuery(time_);
         for (size_t i = 1 + below(6); i > 0; i--) {
             // Who looks after hazards himself puts a barrier everywhere.
             if (!tracked) list.barrier();
-            if (below(8) == 0) list.pushRegion("region");
-            else list.pushRegion("work");
+            list.pushRegion("work");
             if (queue == Queue::Copy || below(3) == 0) copy(list, queue);
             else if (below(8) == 0) build(list);
             else dispatch(list);
             list.popRegion();
         }
         if (!tracked) list.barrier();
+        if (timed) list.endQuery(time_);
     }
 
     void copy(Compute& list, Queue queue) {
@@ -306,6 +361,11 @@ private:
     void dispatch(Compute& list) {
         switch (below(8)) {
             case 0:
+                list.setKernel(programs_.gather);
+                list.setUniformBuffer(0, buffer(), 256 * below(3), 64);
+                list.setTexelBuffer(0, buffer(), FormatRGBAu32, 64 * below(4));
+                list.setStorageBuffer(0, buffer());
+                break;
             case 1: {
                 const Buffer& from = buffer();
                 list.setKernel(programs_.copy);
@@ -319,7 +379,7 @@ private:
                 break;
             case 3:
                 list.setKernel(programs_.sample);
-                bindImage(list, {});
+                bindImage(list, Texture(), Slice());
                 list.setStorageBuffer(0, buffer());
                 break;
             case 4: {
@@ -354,18 +414,16 @@ private:
         list.clearUses();
     }
 
-    /// Binds a sampled image that is none of the attachments.
+    /// Binds a sampled image other than the attachment.
     template <class List>
-    bool bindImage(List& list, const std::vector<std::pair<Texture, Slice>>& attached) {
+    bool bindImage(List& list, const Texture& attached, const Slice& taken, bool depth_taken = false,
+                   const Texture* painted = nullptr) {
         for (int attempt = 0; attempt < 8; attempt++) {
-            const Texture& image = texture();
+            const Texture& image = below(4) ? texture() : depth_;
             const Slice slice = range(image);
-            const bool free = std::ranges::none_of(attached, [&](const auto& one) {
-                return one.first == image && slice.mip <= one.second.mip &&
-                       one.second.mip < slice.mip + slice.mips && slice.layer < one.second.layer + one.second.layers &&
-                       one.second.layer < slice.layer + slice.layers;
-            });
-            if (!free) continue;
+            const bool meets = image == attached && slice.mip <= taken.mip && taken.mip < slice.mip + slice.mips &&
+                               slice.layer <= taken.layer && taken.layer < slice.layer + slice.layers;
+            if (meets || (depth_taken && image == depth_) || (painted && image == *painted)) continue;
             list.setTexture(0, image, slice);
             list.setSampler(0, programs_.sampler);
             return true;
@@ -385,9 +443,15 @@ private:
         list.buildTracing(top_);
     }
 
-    bool record(std::vector<Command>& commands) {
+    void record(std::vector<Command>& commands) {
         const Texture& color = texture();
         const Slice slice = level(color);
+        if (slice.mip == 0 && below(8) == 0) {
+            Target target = device_.createTarget(fine_);
+            target.setColorResolve(0, color, slice);
+            commands.push_back(device_.createCommand(target, "resolve"));
+            return;
+        }
         const bool has_depth = slice.mip == 0 && below(2) == 0;
         constexpr uint8_t begins[] = {Target::BeginLoad, Target::BeginClear, Target::BeginDiscard};
         constexpr uint8_t ends[] = {Target::EndStore, Target::EndStore, Target::EndStore, Target::EndDiscard};
@@ -404,9 +468,14 @@ private:
             const auto& program = programs_.draws[below(programs_.draws.size() / 2) * 2 + (has_depth ? 1 : 0)];
             list.setPipeline(program.pipeline);
             if (program.fetches) list.setVertexBuffer(0, buffer());
-            else list.setStorageBuffer(0, buffer());
-            if (program.samples && !bindImage(list, {{color, slice}})) continue;
-            if (program.stores) list.setStorageBuffer(program.fetches ? 0 : 1, buffer());
+            for (uint32_t slot = 0; slot < program.storages; slot++) list.setStorageBuffer(slot, buffer());
+            const Texture& surface = texture();
+            const Slice painted = level(surface);
+            if (program.paints) {
+                if (surface == color && painted == slice) continue;
+                list.setSurfaceTexture(0, surface, painted);
+            }
+            if (program.samples && !bindImage(list, color, slice, has_depth, program.paints ? &surface : nullptr)) continue;
             switch (below(4)) {
                 case 0:
                     list.setIndexBuffer(FormatRu16, buffer());
@@ -416,15 +485,16 @@ private:
                 default: list.drawArrays(3); break;
             }
         }
-        return true;
     }
 
     Device& device_;
     const Programs& programs_;
     Random random_;
+    const bool may_fail_;
     std::array<Buffer, 4> buffers_;
     std::array<Texture, 2> textures_;
-    Texture depth_;
+    Texture depth_, fine_;
+    Query time_;
     Buffer vertices_;
     std::array<Tracing, 2> bottoms_;
     Tracing top_;
@@ -452,9 +522,15 @@ struct Mutant {
 };
 
 enum Mutation { DropMemory, DropSource, DropDestination, DropTransition, DropTransitionSource, DropWait, MutationCount };
-constexpr const char* mutation_names[] = {"memory barriers",         "source stages",
-                                          "destination stages",      "transitions",
-                                          "sources of transitions",  "waits"};
+
+/// Of what the tracker places, how much may be left out without a finding: what chains of other barriers do anyway.
+struct MutationLimit {
+    const char* name;
+    double redundant;
+};
+constexpr MutationLimit mutation_limits[] = {{"memory barriers", 0.2},        {"source stages", 0.3},
+                                             {"destination stages", 0.25},    {"transitions", 0.01},
+                                             {"sources of transitions", 0.03}, {"waits", 0.1}};
 
 /// Takes one thing away at random; false if there is nothing of the kind.
 bool mutate(Mutant& mutant, Mutation mutation, Random& random) {
@@ -520,49 +596,48 @@ class HazardTracker : public testing::Test {
 protected:
     void SetUp() override {
         device = Device::create({.api = "null", .message = [this](const Message& message) {
-                                     if (messages++ < 10) ADD_FAILURE() << "seed " << seed << ": " << message.error.text();
+                                     if (message.error.id() == tolerated) told++;
+                                     else if (messages++ < 10)
+                                         ADD_FAILURE() << "seed " << seed << ": " << message.error.text();
                                  }});
         ASSERT_TRUE(device);
         control = NullControl::last();
+        programs.emplace(device);
     }
+
+    void runPrograms(uint64_t seeds) {
+        for (seed = 0; seed < seeds && messages == 0; seed++) RandomProgram(device, *programs, seed).run();
+        EXPECT_THAT(device.finish(), IsOk());
+    }
+    void runMutants(uint64_t seeds);
 
     Device device;
     std::shared_ptr<NullControl> control;
+    std::optional<Programs> programs;
     uint64_t seed = 0;
     uint64_t messages = 0;
+    std::string_view tolerated;
+    uint64_t told = 0;
 };
 
-TEST_F(HazardTracker, RandomProgramsAreClean) {
-    const Programs programs(device);
-    for (seed = 0; seed < 3000 && messages == 0; seed++) RandomProgram(device, programs, seed).run();
-    EXPECT_THAT(device.finish(), IsOk());
-    const null::NullCounters counters = control->counters();
-    std::printf("%llu commands, %llu barriers, %llu transitions, %llu splits, %llu waits\n",
-                static_cast<unsigned long long>(counters.commands), static_cast<unsigned long long>(counters.barriers),
-                static_cast<unsigned long long>(counters.image_barriers),
-                static_cast<unsigned long long>(counters.splits), static_cast<unsigned long long>(counters.waits));
-}
-
-TEST_F(HazardTracker, WhatIsLeftOutIsMissed) {
+void HazardTracker::runMutants(uint64_t seeds) {
     struct Shadow {
         HazardChecker checker;
         Mutation mutation;
         bool caught;
     };
     std::vector<Shadow> shadows;
-    std::array<uint64_t, MutationCount> made = {}, caught = {};
+    std::array<double, MutationCount> made = {}, caught = {};
     uint64_t emptied = 0;
     std::optional<Random> random;
     control->setObserver([&](const Submission& submission, const HazardChecker& before) {
         for (Shadow& shadow : shadows)
             if (!shadow.caught) shadow.caught = !shadow.checker.judge(submission).empty();
         for (int i = 0; i < MutationCount; i++) {
-            const auto mutation = static_cast<Mutation>(i);
             Mutant mutant(submission);
-            if (!mutate(mutant, mutation, *random)) continue;
-            Shadow shadow{before, mutation, false};
-            shadow.caught = !mutant.judge(submission, shadow.checker).empty();
-            shadows.push_back(std::move(shadow));
+            if (!mutate(mutant, static_cast<Mutation>(i), *random)) continue;
+            shadows.push_back({before, static_cast<Mutation>(i), false});
+            shadows.back().caught = !mutant.judge(submission, shadows.back().checker).empty();
         }
         // Without any of its barriers a list with a conflict in it is always caught.
         for (size_t i = 0; i < submission.lists.size(); i++) {
@@ -574,10 +649,9 @@ TEST_F(HazardTracker, WhatIsLeftOutIsMissed) {
             EXPECT_FALSE(mutant.judge(submission, checker).empty()) << "seed " << seed;
         }
     });
-    const Programs programs(device);
-    for (seed = 0; seed < 1000 && messages == 0; seed++) {
+    for (seed = 0; seed < seeds && messages == 0; seed++) {
         random.emplace(seed ^ 0x5eed);
-        RandomProgram(device, programs, seed).run();
+        RandomProgram(device, *programs, seed).run();
         for (const Shadow& shadow : shadows) {
             made[shadow.mutation]++;
             caught[shadow.mutation] += shadow.caught;
@@ -585,13 +659,43 @@ TEST_F(HazardTracker, WhatIsLeftOutIsMissed) {
         shadows.clear();
     }
     EXPECT_THAT(device.finish(), IsOk());
-    EXPECT_GT(emptied, 1000u);
-    for (int i = 0; i < MutationCount; i++) {
-        const double redundant = 1.0 - static_cast<double>(caught[i]) / static_cast<double>(made[i]);
-        std::printf("%s: %llu left out, %.1f%% of them redundant\n", mutation_names[i],
-                    static_cast<unsigned long long>(made[i]), 100.0 * redundant);
-        EXPECT_GT(made[i], 500u) << mutation_names[i];
+    EXPECT_GT(emptied, seeds);
+    for (size_t i = 0; i < MutationCount; i++) {
+        const double redundant = 1.0 - caught[i] / made[i];
+        std::printf("%s: %.0f left out, %.1f%% of them redundant\n", mutation_limits[i].name, made[i],
+                    100.0 * redundant);
+        EXPECT_GT(made[i], static_cast<double>(seeds)) << mutation_limits[i].name;
+        EXPECT_LT(redundant, mutation_limits[i].redundant) << mutation_limits[i].name;
     }
+}
+
+using HazardTrackerLong = HazardTracker;
+
+TEST_F(HazardTracker, RandomProgramsAreClean) { runPrograms(3000); }
+
+TEST_F(HazardTrackerLong, RandomProgramsAreClean) {
+    runPrograms(100000);
+    const null::NullCounters counters = control->counters();
+    std::printf("%llu commands, %llu barriers, %llu transitions, %llu splits, %llu waits\n",
+                static_cast<unsigned long long>(counters.commands), static_cast<unsigned long long>(counters.barriers),
+                static_cast<unsigned long long>(counters.image_barriers),
+                static_cast<unsigned long long>(counters.splits), static_cast<unsigned long long>(counters.waits));
+}
+
+TEST_F(HazardTracker, WhatIsLeftOutIsMissed) { runMutants(200); }
+
+TEST_F(HazardTrackerLong, WhatIsLeftOutIsMissed) { runMutants(2000); }
+
+// A submission that failed was not played: what comes after it must not count on it.
+TEST_F(HazardTracker, FailedSubmissionsLeaveNoTrace) {
+    tolerated = "device.out_of_memory";
+    for (seed = 0; seed < 300 && messages == 0; seed++) {
+        control->failSubmit(1 + seed % 7, ErrorCode::OutOfMemory);
+        RandomProgram(device, *programs, seed, true).run();
+    }
+    control->failSubmit(0, ErrorCode::OutOfMemory);
+    EXPECT_GT(told, 200u);
+    EXPECT_THAT(device.finish(), IsOk());
 }
 
 }  // namespace

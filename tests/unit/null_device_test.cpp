@@ -21,6 +21,16 @@ using null::NullControl;
 using null::NullSettings;
 using null::ScopedSettings;
 
+constexpr const char* trace_kernel = R"(
+layout(local_size_x = 8) in;
+layout(binding = 0) uniform accelerationStructureEXT scene;
+layout(binding = 1) buffer To { uint to[]; };
+void main() {
+    rayQueryEXT query;
+    rayQueryInitializeEXT(query, scene, 0u, 0xffu, vec3(0.0), 0.0, vec3(1.0), 1.0);
+    to[gl_GlobalInvocationID.x] = rayQueryProceedEXT(query) ? 1u : 0u;
+})";
+
 class NullDevice : public testing::Test {
 protected:
     void open(const NullSettings& settings = {}, FeatureMask required = 0) {
@@ -242,15 +252,7 @@ TEST_F(NullDevice, StructuresAreBuiltCompactedAndFollowed) {
     EXPECT_LT(bottom.getMemory(), memory);
 
     Kernel kernel = device.createKernel("kernel");
-    kernel.createShaderGLSL(R"(
-        layout(local_size_x = 8) in;
-        layout(binding = 0) uniform accelerationStructureEXT scene;
-        layout(binding = 1) buffer B { uint b[]; };
-        void main() {
-            rayQueryEXT query;
-            rayQueryInitializeEXT(query, scene, 0u, 0xffu, vec3(0.0), 0.0, vec3(1.0), 1.0);
-            b[gl_GlobalInvocationID.x] = rayQueryProceedEXT(query) ? 1u : 0u;
-        })");
+    kernel.createShaderGLSL(trace_kernel);
     ASSERT_THAT(kernel.create(), IsOk());
     const Buffer buffer = device.createBuffer(Buffer::FlagStorage, 64, "buffer");
     Compute compute = device.createCompute();
@@ -273,6 +275,42 @@ TEST_F(NullDevice, CompactedStructuresCanBeUpdatedButNotBuiltAgain) {
     expected = "tracing.compacted";
     device.buildTracing(tracing);
     EXPECT_THAT(device.finish(), HasErrorId("tracing.compacted"));
+}
+
+TEST_F(NullDevice, TracesFollowWhatWasBuiltNotWhatWasSetSince) {
+    const Buffer vertices = device.createBuffer(Buffer::FlagTracing, 36, "vertices");
+    const auto makeBottom = [&] {
+        Tracing bottom = device.createTracing("bottom");
+        bottom.addVertexBuffer(3, FormatRGBf32, 12, vertices);
+        EXPECT_THAT(bottom.create(Tracing::TypeTriangle), IsOk());
+        device.buildTracing(bottom);
+        return bottom;
+    };
+    Kernel kernel = device.createKernel("kernel");
+    kernel.createShaderGLSL(trace_kernel);
+    ASSERT_THAT(kernel.create(), IsOk());
+    const Buffer buffer = device.createBuffer(Buffer::FlagStorage, 64, "buffer");
+    const auto trace = [&](const Tracing& top) {
+        Compute compute = device.createCompute();
+        compute.setKernel(kernel);
+        compute.setTracing(0, top);
+        compute.setStorageBuffer(0, buffer);
+        compute.dispatch(16);
+        EXPECT_THAT(device.submit(compute), IsOk());
+    };
+
+    Tracing first = makeBottom();
+    const Tracing second = makeBottom();
+    const Tracing top = device.createTracing({Tracing::Instance{.tracing = &first}});
+    device.buildTracing(top);
+    trace(top);
+    const Tracing::Instance next = {.tracing = &second};
+    device.setTracing(top, {&next, 1});
+    first = {};
+    trace(top);
+    device.buildTracing(top);
+    trace(top);
+    ASSERT_THAT(device.finish(), IsOk());
 }
 
 // Time.

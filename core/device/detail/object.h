@@ -286,6 +286,8 @@ public:
     std::vector<Tracing::Instance> instance_data;   ///< set by setTracing; their `tracing` is not used
     std::vector<TracingObject*> instance_tracings;  ///< what they refer to, or nullptr
     std::vector<Ref<TracingObject>> references;     ///< the same, each once
+    /// Those of the instances that were built last: what a trace reads, whatever has been set since.
+    std::vector<Ref<TracingObject>> built_references;
     Ref<BufferObject> instance_buffer;  ///< native records, written when it is built: compaction moves structures
     bool built = false;                 ///< a build has been recorded
     bool compacted = false;

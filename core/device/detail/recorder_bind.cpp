@@ -284,7 +284,7 @@ void RecorderCore::accessBound(const ShaderResource& resource, SlotKind kind, co
             case SlotKind::Tracing:
                 access(index, stage, AccessRead);
                 for (const Ref<TracingObject>& reference :
-                     static_cast<TracingObject*>(list_.resources[index])->references)
+                     static_cast<TracingObject*>(list_.resources[index])->built_references)
                     access(use(*reference), stage, AccessRead);
                 break;
             case SlotKind::Uniform: access(index, stage, AccessRead); break;

@@ -142,6 +142,10 @@ void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::
             access(build.instances, Stage::Build, AccessRead);
         }
         tracing.built = true;
+        if (!std::equal(tracing.references.begin(), tracing.references.end(), tracing.built_references.begin(),
+                        tracing.built_references.end(),
+                        [](const Ref<TracingObject>& a, const Ref<TracingObject>& b) { return a.get() == b.get(); }))
+            tracing.built_references = tracing.references;
         builds_.push_back(build);
     }
     const uint32_t place = append(builds_.data(), builds_.size() * sizeof(TracingBuild));

@@ -67,8 +67,16 @@ void Tracker::resolveList(const CommandList& list) {
             require(all_stages, all_stages);
         }
         untracked_ = header.untracked;
-        for (uint32_t i = 0; i < header.access_count; i++) access(list, list.accesses[header.first_access + i]);
-        for (uint32_t i = 0; i < header.shared_count; i++) access(list, list.accesses[header.first_shared + i]);
+        // All accesses are ordered after what was before the command, and only then remembered: no barrier lies between
+        // the stages of one command.
+        const auto forEachAccess = [&](auto step) {
+            for (uint32_t i = 0; i < header.access_count; i++)
+                forEachState(list, list.accesses[header.first_access + i], step);
+            for (uint32_t i = 0; i < header.shared_count; i++)
+                forEachState(list, list.accesses[header.first_shared + i], step);
+        };
+        forEachAccess(&Tracker::order);
+        forEachAccess(&Tracker::record);
         if (header.type == CommandType::EndTarget) {
             in_target_ = false;
             // Attachments are written until here, also by the parts that splits have made.
@@ -142,24 +150,24 @@ bool Tracker::waitFor(Queue queue, uint64_t value) {
     return true;
 }
 
-void Tracker::access(const CommandList& list, const Access& access) {
+void Tracker::forEachState(const CommandList& list, const Access& access, Step step) {
     Object* object = list.resources[access.resource];
     switch (object->type()) {
-        case ObjectType::Buffer: accessState(static_cast<BufferObject*>(object)->use, access, {}); break;
-        case ObjectType::Tracing: accessState(static_cast<TracingObject*>(object)->use, access, {}); break;
+        case ObjectType::Buffer: (this->*step)(static_cast<BufferObject*>(object)->use, access, {}); break;
+        case ObjectType::Tracing: (this->*step)(static_cast<TracingObject*>(object)->use, access, {}); break;
         case ObjectType::Texture: {
             auto* texture = static_cast<TextureObject*>(object);
             for (uint32_t layer = access.slice.layer; layer < access.slice.layer + access.slice.layers; layer++)
                 for (uint32_t mip = access.slice.mip; mip < access.slice.mip + access.slice.mips; mip++)
-                    accessState(texture->use(mip, layer), access,
-                                {static_cast<uint16_t>(mip), 1, static_cast<uint16_t>(layer), 1});
+                    (this->*step)(texture->use(mip, layer), access,
+                                  {static_cast<uint16_t>(mip), 1, static_cast<uint16_t>(layer), 1});
             break;
         }
         default: break;
     }
 }
 
-void Tracker::accessState(ResourceState& state, const Access& access, const Slice& slice) {
+void Tracker::order(ResourceState& state, const Access& access, const Slice& slice) {
     touch(state);
     const size_t queue = static_cast<size_t>(queue_);
     const StageMask stage = bit(access.stage);
@@ -180,7 +188,8 @@ void Tracker::accessState(ResourceState& state, const Access& access, const Slic
     const ResourceState::Reads& reads = state.reads[queue];
     StageMask source = 0;
     uint64_t newest = 0;
-    if (own_write && !(state.visible & stage) && !isOrdered(state.write_stages, access.stage, state.write_position)) {
+    if (own_write && !(state.visible & stage) && !isOrdered(state.write_stages, access.stage, state.write_position) &&
+        (transition || !joinTransition(state, access, slice))) {
         source |= state.write_stages;
         newest = state.write_position;
     }
@@ -192,17 +201,6 @@ void Tracker::accessState(ResourceState& state, const Access& access, const Slic
         // The transition itself has to wait, so an earlier barrier to this stage is no substitute.
         if (own_write) newest = std::max(newest, state.write_position);
         if (reads.stages) newest = std::max(newest, reads.position);
-    }
-
-    // A transition made for this very barrier, for another stage of the command: one transition serves both.
-    if (!changes && source && state.visible && state.write_position == barrier_position_) {
-        for (ImageBarrier& image : pending_images_) {
-            if (image.resource != access.resource || !covers(image.slice, slice)) continue;
-            image.destination |= stage;
-            source = 0;
-        }
-        state.visible |= stage;
-        state.write_stages |= stage;
     }
 
     const bool places = transition || (source && !untracked_);
@@ -225,20 +223,39 @@ void Tracker::accessState(ResourceState& state, const Access& access, const Slic
     } else if (source && !untracked_) {
         require(source, stage);
     }
+}
 
-    if (write) {
-        state.write_value = value_;
-        state.write_position = position_;
-        state.write_stages = stage;
-        state.visible = 0;
-        state.write_queue = queue_;
-        for (ResourceState::Reads& other : state.reads) other = {};
-    } else {
-        ResourceState::Reads& own = state.reads[queue];
+void Tracker::record(ResourceState& state, const Access& access, const Slice&) {
+    const StageMask stage = bit(access.stage);
+    ResourceState::Reads& own = state.reads[static_cast<size_t>(queue_)];
+    if (!(access.flags & AccessWrite)) {
         own.value = value_;
         own.position = position_;
         own.stages |= stage;
+        return;
     }
+    const bool joins = state.write_queue == queue_ && state.write_position == position_ && !state.visible;
+    state.write_value = value_;
+    state.write_position = position_;
+    state.write_stages = joins ? static_cast<StageMask>(state.write_stages | stage) : stage;
+    state.visible = 0;
+    state.write_queue = queue_;
+    for (ResourceState::Reads& reads : state.reads)
+        if (&reads != &own || reads.position != position_) reads = {};
+}
+
+bool Tracker::joinTransition(ResourceState& state, const Access& access, const Slice& slice) {
+    if (!state.visible || state.write_position != barrier_position_) return false;
+    bool joined = false;
+    for (ImageBarrier& image : pending_images_) {
+        if (image.resource != access.resource || !covers(image.slice, slice)) continue;
+        image.destination |= bit(access.stage);
+        joined = true;
+    }
+    if (!joined) return false;
+    state.visible |= bit(access.stage);
+    state.write_stages |= bit(access.stage);
+    return true;
 }
 
 void Tracker::endAttachment(const CommandList& list, const Access& access) {

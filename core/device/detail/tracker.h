@@ -45,8 +45,14 @@ private:
         ResourceState old;
     };
     void resolveList(const CommandList& list);
-    void access(const CommandList& list, const Access& access);
-    void accessState(ResourceState& state, const Access& access, const Slice& slice);
+    using Step = void (Tracker::*)(ResourceState& state, const Access& access, const Slice& slice);
+    void forEachState(const CommandList& list, const Access& access, Step step);
+    /// Adds to the barrier what orders the access after everything before its command.
+    void order(ResourceState& state, const Access& access, const Slice& slice);
+    /// Remembers the access.
+    void record(ResourceState& state, const Access& access, const Slice& slice);
+    /// True if a transition in the barrier being collected can serve the stage of this access, too.
+    bool joinTransition(ResourceState& state, const Access& access, const Slice& slice);
     void endAttachment(const CommandList& list, const Access& access);
     void touch(ResourceState& state);
 

@@ -7,7 +7,6 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,26 +55,24 @@ struct Mesh {
     bool operator==(const Mesh&) const = default;
 };
 
-/// Reads a Wavefront OBJ file's text: `v`, `vt`, `vn`, `f` (with indices from the start or, negative, from the end) and
-/// `o` and `g`, each of which begins a part. Materials, curves, lines and points are passed over.
+/// Reads a Wavefront OBJ file's text with tinyobjloader: `v`, `vt`, `vn`, `f` (with indices from the start or,
+/// negative, from the end) and `o` and `g`, each of which begins a part. Everything else is passed over: materials,
+/// curves, lines, points.
 ///
-/// - A vertex is made of each distinct triple of indices, in the order of first use; positions in no face are left out.
-/// - Polygons of up to 1024 corners are split into triangles, concave ones too, if they are flat and do not cross
-///   themselves; the split goes along existing corners, and a polygon of n corners always gives n - 2 triangles.
+/// - A vertex is made of each distinct triple of indices, in the order in which the triangles use them; positions in no
+///   face are left out.
+/// - Polygons are split along existing corners: a quadrilateral along its shorter diagonal, n corners into n - 2
+///   triangles. Right for flat convex polygons. A concave one may be covered wrongly, and one of more than four corners
+///   may lose triangles too, which gives the warning "mesh.polygon_incomplete": have the modelling program write
+///   triangles.
 /// - Normals and texture coordinates are kept if every corner of every face has them, otherwise they are left out with
 ///   the warning "mesh.attribute_dropped". Normals are brought to unit length; one of length zero becomes (0, 0, 1).
-/// - Numbers are rounded correctly to float32.
+/// - Numbers are rounded to float32 within one unit of the last place.
 ///
-/// `name` names the file in errors; every error has the line. The mesh may take `limit` bytes; beside it the reader
-/// takes at most 64 bytes for each byte of text. Errors: "mesh.empty_file", "mesh.no_faces", "mesh.syntax" (a number is
-/// missing or malformed), "mesh.index_range" (an index is 0 or names nothing that stands above it), "mesh.not_finite",
-/// "mesh.face_corners" (fewer than 3 or more than 1024), "mesh.too_large".
+/// `name` names the file in errors; those at one line have the line. The mesh may take `limit` bytes; beside it the
+/// reader takes at most 128 bytes for each byte of text. Errors: "mesh.empty_file", "mesh.no_faces", "mesh.syntax" (a
+/// number is missing or malformed), "mesh.index_range" (an index is malformed, 0 or names nothing that stands above
+/// it), "mesh.not_finite", "mesh.face_corners" (fewer than 3 or more than 1024), "mesh.too_large".
 Expected<Mesh> parseObj(std::string_view text, const std::string& name, uint64_t limit = Mesh::default_limit);
-
-/// Splits a polygon, given by its corners in order, into n - 2 triangles: three numbers of corners for each, turning as
-/// the polygon does. Right for flat polygons that do not cross themselves, convex or not; others give some
-/// triangulation. Time grows with the square of the corners, for hostile ones with the cube. Empty for fewer than three
-/// corners.
-std::vector<uint32_t> triangulatePolygon(std::span<const Vector3f> corners);
 
 }  // namespace glint

@@ -6,6 +6,7 @@
 #include <glint/base/log.h>
 #include <glint/format/mesh.h>
 
+#include <fmt/format.h>
 #include <glm/geometric.hpp>
 
 #include <gtest/gtest.h>
@@ -37,19 +38,43 @@ TEST(Obj, Triangle) {
 
 TEST(Obj, LineEndsBlanksAndComments) {
     const std::string text = "# comment\r\n\r\n  v\t0 0 0 \r\nv 1 0 0 1 0.5 0.5 0.5\nv 0 1 0\r\n\tf  1  2\t3  \r\n"
-                             "usemtl red\nmtllib a.mtl\ns off\nl 1 2\np 1\nvp 0.3\ncstype bezier";
+                             "usemtl red\nmtllib a.mtl\ns off\nl 0 x\np 1\nvw 1 -1\nt x 9/9/9\nvp 0.3\ncstype bezier";
     const Expected<Mesh> mesh = parse(text);
     ASSERT_THAT(mesh, IsOk());
     EXPECT_EQ(*mesh, parse(triangle).value());
 }
 
-TEST(Obj, NumbersAreRoundedCorrectly) {
+TEST(Obj, NumbersAreRoundedToOneUnitOfTheLastPlace) {
     const Expected<Mesh> mesh =
-        parse("v +0.1 -1.17549435e-38 1e-45\nv 16777217 3.4028235e38 1e-60\nv .5 5. -0\nf 1 2 3\n");
+        parse("v +0.1 -1.17549435e-38 1e-45\nv 16777217 3.4028234e38 1e-60\nv .5 5. -0\nf 1 2 3\n");
     ASSERT_THAT(mesh, IsOk());
-    EXPECT_EQ(mesh->positions[0], Vector3f(0.1f, -1.17549435e-38f, 1e-45f));
-    EXPECT_EQ(mesh->positions[1], Vector3f(16777216.0f, 3.4028235e38f, 0.0f));
-    EXPECT_EQ(mesh->positions[2], Vector3f(0.5f, 5.0f, 0.0f));
+    const std::vector<Vector3f> expected = {
+        {0.1f, -1.17549435e-38f, 1e-45f}, {16777217.0f, 3.4028234e38f, 0.0f}, {0.5f, 5.0f, 0.0f}};
+    for (size_t i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) {
+            const float value = mesh->positions[i][k], wanted = expected[i][k];
+            EXPECT_LE(std::nextafter(wanted, -INFINITY), value) << i << " " << k;
+            EXPECT_GE(std::nextafter(wanted, INFINITY), value) << i << " " << k;
+        }
+    EXPECT_EQ(mesh->positions[2], expected[2]);
+}
+
+TEST(Obj, RandomNumbersAreRoundedToOneUnitOfTheLastPlace) {
+    Random random(5);
+    for (int run = 0; run < 300; run++) {
+        Vector3f wanted;
+        std::string text = "v";
+        for (int k = 0; k < 3; k++) {
+            wanted[k] = static_cast<float>(random.uniform(-10, 10) * std::pow(10.0, random.uniform(-30, 30)));
+            text += fmt::format(" {:.9g}", wanted[k]);
+        }
+        const Expected<Mesh> mesh = parse(text + "\nf 1 1 1\n");
+        ASSERT_THAT(mesh, IsOk());
+        for (int k = 0; k < 3; k++) {
+            EXPECT_LE(std::nextafter(wanted[k], -INFINITY), mesh->positions[0][k]) << text;
+            EXPECT_GE(std::nextafter(wanted[k], INFINITY), mesh->positions[0][k]) << text;
+        }
+    }
 }
 
 TEST(Obj, NegativeIndicesCountFromTheEnd) {
@@ -85,9 +110,9 @@ TEST(Obj, PartialAttributesAreDroppedWithAWarning) {
 
 TEST(Obj, ObjectsAndGroupsArePartsIfTheyHaveFaces) {
     const Expected<Mesh> mesh = parse("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\no empty\ng the  lid \nf 1 2 3 4\n"
-                                      "g\nf 1 2 3\n");
+                                      "g\nf 1 2 3\no  a box \nf 1 2 3\n");
     ASSERT_THAT(mesh, IsOk());
-    EXPECT_EQ(mesh->parts, (std::vector<MeshPart>{{"", 0, 3}, {"the  lid", 3, 6}, {"", 9, 3}}));
+    EXPECT_EQ(mesh->parts, (std::vector<MeshPart>{{"", 0, 3}, {"the lid", 3, 6}, {"", 9, 3}, {"a box", 12, 3}}));
     EXPECT_THAT(mesh->validate(), IsOk());
 }
 
@@ -114,12 +139,17 @@ TEST(Obj, ErrorsNameFileAndLine) {
         {"v 0 0 0x10\n", "mesh.syntax", 1},
         {"v 0 0 --1\n", "mesh.syntax", 1},
         {"v 0 0 +\n", "mesh.syntax", 1},
+        {"v 0 0 +-1\n", "mesh.syntax", 1},
+        {"v 0 0 .\n", "mesh.syntax", 1},
+        {"v\n", "mesh.syntax", 1},
         {"vt\n", "mesh.syntax", 1},
         {"v 0 0 nan\n", "mesh.not_finite", 1},
         {"\nv 0 inf 0\n", "mesh.not_finite", 2},
         {"v 0 0 1e39\n", "mesh.not_finite", 1},
         {"v 0 0 1e999\n", "mesh.syntax", 1},
         {"vn 0 -nan 0\n", "mesh.not_finite", 1},
+        {"v 0 0 0e999\nf 1 1 1\n", "mesh.not_finite", 0},
+        {"v 0 0 0\r\nv 1 0 0\rv 0 1 0\n\rf 1 2 4", "mesh.index_range", 5},
         {"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "mesh.index_range", 4},
         {"v 0 0 0\nv 1 0 0\nf 1 2 3\nv 0 1 0\n", "mesh.index_range", 3},
         {"v 0 0 0\nf 0 1 1\n", "mesh.index_range", 2},
@@ -131,6 +161,9 @@ TEST(Obj, ErrorsNameFileAndLine) {
         {"v 0 0 0\nf 1/1 1/1 1/1\n", "mesh.index_range", 2},
         {"v 0 0 0\nf 1//1 1//1 1//1\n", "mesh.index_range", 2},
         {"v 0 0 0\nvn 0 0 1\nf 1//1/1 1//1 1//1\n", "mesh.index_range", 3},
+        {"v 0 0 0\nvt 0 0\nf 1/ 1/ 1/\n", "mesh.index_range", 3},
+        {"v 0 0 0\nvn 0 0 1\nf 1// 1// 1//\n", "mesh.index_range", 3},
+        {"v 0 0 0\nf /1 1 1\n", "mesh.index_range", 2},
         {"v 0 0 0\nf 1 1\n", "mesh.face_corners", 2},
         {"v 0 0 0\nf\n", "mesh.face_corners", 2},
     };
@@ -150,6 +183,13 @@ TEST(Obj, CornersAndMemoryAreBounded) {
     // Three vertices of 32 bytes and three indices.
     EXPECT_THAT(parse(triangle, 108), IsOk());
     EXPECT_THAT(parse(triangle, 107), HasErrorId("mesh.too_large"));
+}
+
+TEST(Obj, ZeroBytesAreErrors) {
+    const Expected<Mesh> mesh = parse(std::string_view("v 0 0 0\nf 1 1 1\0 1\n", 18));
+    ASSERT_THAT(mesh, HasErrorId("mesh.index_range"));
+    ASSERT_THAT(parse(std::string_view("v 0 0 0\nv 1 1 1 \0\nf 1 1 1\n", 27)), HasErrorId("mesh.syntax"));
+    ASSERT_THAT(parse(std::string_view("#\0\nv 0 0 0\nf 1 1 1\n", 19)), IsOk());
 }
 
 TEST(Obj, MutationsAreErrorsOrValidMeshes) {
@@ -186,56 +226,74 @@ TEST(Obj, MutationsAreErrorsOrValidMeshes) {
     EXPECT_GT(readable, 500);
 }
 
-TEST(Polygon, ConvexIsAFan) {
-    const std::vector<Vector3f> square = {{0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
-    EXPECT_EQ(triangulatePolygon(square), (std::vector<uint32_t>{0, 1, 2, 0, 2, 3}));
-    EXPECT_TRUE(triangulatePolygon(std::span(square).first(2)).empty());
+TEST(Obj, QuadrilateralsAreSplitAlongTheShorterDiagonal) {
+    const Expected<Mesh> mesh = parse("v 0 0 1\nv 4 0 1\nv 5 1 1\nv 1 1 1\nf 1 2 3 4");
+    ASSERT_THAT(mesh, IsOk());
+    EXPECT_EQ(mesh->positions, (std::vector<Vector3f>{{0, 0, 1}, {4, 0, 1}, {1, 1, 1}, {5, 1, 1}}));
+    EXPECT_EQ(mesh->indices, (std::vector<uint32_t>{0, 1, 2, 1, 3, 2}));
 }
 
-// Of a flat simple polygon the triangles turn as it does, and their areas add up to its area: so none overlap.
-TEST(Polygon, ConcavePolygonsAreCovered) {
+// Of a flat convex polygon the triangles turn as it does, and their areas add up to its area: so none overlap.
+TEST(Obj, ConvexPolygonsAreCovered) {
     Random random(3);
     for (int run = 0; run < 300; run++) {
         const auto count = static_cast<uint32_t>(4 + random.below(40));
         const Vector3d x = random.direction();
         const Vector3d y = glm::normalize(glm::cross(x, random.direction()));
         const Vector3d normal = glm::cross(x, y);
-        std::vector<Vector3f> corners;
-        double area = 0.0;
+        const Vector3d centre = random.direction() * random.uniform(0, 10);
+        const double size = std::pow(10.0, random.uniform(-4, 4));
+        std::vector<Vector3d> corners;
+        std::string text, face = "f";
         for (uint32_t i = 0; i < count; i++) {
-            // A star seen from its centre never crosses itself.
             const double angle = 6.283185307179586 * i / count;
-            const double radius = random.uniform(0.2, 3.0);
-            corners.emplace_back((x * std::cos(angle) + y * std::sin(angle)) * radius + normal * 5.0);
+            corners.push_back((x * std::cos(angle) + y * 0.3 * std::sin(angle) + centre) * size);
+            text += fmt::format("v {} {} {}\n", corners[i].x, corners[i].y, corners[i].z);
+            face += fmt::format(" {}", i + 1);
         }
+        double area = 0.0;
         for (uint32_t i = 0; i < count; i++)
-            area += 0.5 * glm::dot(normal, glm::cross(Vector3d(corners[i]), Vector3d(corners[(i + 1) % count])));
-        const std::vector<uint32_t> triangles = triangulatePolygon(corners);
-        ASSERT_EQ(triangles.size(), 3 * (count - 2));
+            area += 0.5 * glm::dot(normal, glm::cross(corners[i] - corners[0], corners[(i + 1) % count] - corners[0]));
+        const Expected<Mesh> mesh = parse(text + face);
+        ASSERT_THAT(mesh, IsOk());
+        ASSERT_EQ(mesh->triangleCount(), count - 2) << run;
         double sum = 0.0;
-        for (size_t i = 0; i < triangles.size(); i += 3) {
-            const Vector3d a(corners[triangles[i]]), b(corners[triangles[i + 1]]), c(corners[triangles[i + 2]]);
+        for (size_t i = 0; i < mesh->indices.size(); i += 3) {
+            const Vector3d a(mesh->positions[mesh->indices[i]]);
+            const Vector3d b(mesh->positions[mesh->indices[i + 1]]);
+            const Vector3d c(mesh->positions[mesh->indices[i + 2]]);
             const double signed_area = 0.5 * glm::dot(normal, glm::cross(b - a, c - a));
-            EXPECT_GT(signed_area, -1e-5);
+            EXPECT_GT(signed_area, -1e-5 * area);
             sum += signed_area;
         }
-        EXPECT_NEAR(sum, area, 1e-5 * area);
+        EXPECT_NEAR(sum, area, 1e-4 * area);
     }
 }
 
-TEST(Polygon, HostileCornersGiveTriangles) {
+// Concave and crossing ones of tinyobjloader 2.0.0rc10 may lose triangles: never all of them, and never unsaid.
+TEST(Obj, HostilePolygonsGiveTrianglesOrAWarning) {
+    std::string ids;
+    setLogCallback([&](LogLevel, std::string_view id, std::string_view) { ids = id; });
     Random random(4);
-    const float nan = std::numeric_limits<float>::quiet_NaN();
+    int incomplete = 0;
     for (int run = 0; run < 300; run++) {
-        const size_t count = 3 + random.below(30);
-        std::vector<Vector3f> corners;
-        for (size_t i = 0; i < count; i++) corners.emplace_back(random.direction() * (run % 3 ? 1.0 : 1e38));
-        if (run % 5 == 0) corners[random.below(count)].x = nan;
-        if (run % 7 == 0) corners.assign(count, Vector3f(1.0f));
-        const std::vector<uint32_t> triangles = triangulatePolygon(corners);
-        EXPECT_EQ(triangles.size(), 3 * (count - 2));
-        for (const uint32_t corner : triangles) EXPECT_LT(corner, count);
+        const size_t count = 4 + random.below(30);
+        std::string text, face = "f";
+        for (size_t i = 0; i < count; i++) {
+            const Vector3d corner = run % 7 == 0 ? Vector3d(1) : random.direction() * (run % 3 ? 1.0 : 1e38);
+            text += fmt::format("v {} {} {}\n", corner.x, corner.y, corner.z);
+            face += fmt::format(" {}", i + 1);
+        }
+        ids.clear();
+        const Expected<Mesh> mesh = parse(text + "f 1 2 3\n" + face);
+        ASSERT_THAT(mesh, IsOk());
+        EXPECT_THAT(mesh->validate(), IsOk());
+        EXPECT_LE(mesh->triangleCount(), count - 1);
+        EXPECT_EQ(ids, mesh->triangleCount() < count - 1 ? "mesh.polygon_incomplete" : "") << run;
+        incomplete += !ids.empty();
     }
+    setLogCallback({});
+    EXPECT_GT(incomplete, 0) << "the library has become better: say so in mesh.h";
 }
 
 TEST(Mesh, ValidateNamesTheElement) {

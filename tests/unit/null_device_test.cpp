@@ -377,6 +377,26 @@ TEST_F(NullDevice, QueuesWaitForEachOther) {
     EXPECT_TRUE(fence.isSignaled());
 }
 
+TEST_F(NullDevice, ThreadsShareIt) {
+    std::vector<std::thread> threads;
+    for (uint32_t t = 0; t < 4; t++) {
+        threads.emplace_back([this, t] {
+            const Queue queue = t % 2 ? Queue::Compute : Queue::Main;
+            for (uint32_t i = 0; i < 50; i++) {
+                const Buffer buffer = device.createBuffer(Buffer::FlagNone, 256, "buffer");
+                Compute compute = device.createCompute(queue);
+                compute.clearBuffer(buffer, i);
+                ASSERT_THAT(device.submit(compute), IsOk());
+                const Expected<std::vector<uint32_t>> read = device.read<uint32_t>(buffer, 0, 4);
+                ASSERT_THAT(read, IsOk());
+                EXPECT_THAT(*read, testing::Each(i));
+            }
+        });
+    }
+    for (uint32_t i = 0; i < 200; i++) (void)control->counters();
+    for (std::thread& thread : threads) thread.join();
+}
+
 // Failures.
 
 TEST_F(NullDevice, MemoryRunsOut) {

@@ -10,8 +10,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <new>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace glint::detail {
@@ -344,13 +347,28 @@ struct BarrierCommand {
     CommandHeader header;
 };
 
+/// Leaves elements that a vector makes by growing as the memory was: they are written right after.
+template <class T>
+struct UnsetAllocator : std::allocator<T> {
+    template <class U>
+    struct rebind {
+        using other = UnsetAllocator<U>;
+    };
+    void construct(T*) noexcept {}
+    template <class... Args>
+    void construct(T* place, Args&&... args) {
+        new (place) T(std::forward<Args>(args)...);
+    }
+};
+using UnsetBytes = std::vector<std::byte, UnsetAllocator<std::byte>>;
+
 /// A closed list is constant until it is recycled. Buffers keep their capacity, so that a warm frame allocates nothing.
 struct CommandList {
     std::vector<std::byte> bytes;     ///< command payloads that commands point into: bindings, names
     std::vector<std::byte> commands;  ///< commands one after the other, each a multiple of 8 bytes
     std::vector<Access> accesses;
-    std::vector<Object*> resources;      ///< one reference held for each
-    std::vector<std::byte> inline_data;  ///< uploaded at submit, to an address aligned to 256 bytes
+    std::vector<Object*> resources;  ///< one reference held for each
+    UnsetBytes inline_data;          ///< uploaded at submit, to an address aligned to 256 bytes
     uint32_t command_count = 0;
     uint32_t region_depth = 0;
     std::string label;  ///< of the recorder, for debuggers and lost-device messages

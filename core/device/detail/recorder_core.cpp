@@ -169,7 +169,9 @@ uint32_t RecorderCore::append(const void* data, size_t size, size_t alignment) {
 uint32_t RecorderCore::appendInline(const void* data, uint64_t size, uint64_t alignment, uint64_t padded) {
     const uint64_t offset = (list_.inline_data.size() + alignment - 1) / alignment * alignment;
     list_.inline_data.resize(offset + std::max(size, padded));
-    if (data) std::memcpy(list_.inline_data.data() + offset, data, size);
+    std::byte* place = list_.inline_data.data() + offset;
+    if (data) std::memcpy(place, data, size);
+    if (padded > size) std::memset(place + size, 0, padded - size);
     return static_cast<uint32_t>(offset);
 }
 

@@ -224,6 +224,7 @@ private:
     // Scratch of one call, kept for its capacity.
     std::vector<const NativeTracing*> natives_;
     std::vector<TracingObject*> references_;
+    std::vector<TracingObject*> bottoms_;
     std::vector<TracingBuild> builds_;
 };
 

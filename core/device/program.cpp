@@ -407,8 +407,12 @@ Status Program::wait(Where where) const {
     if (!object_) return error().at(where);
     auto* program = static_cast<ProgramObject*>(object_);
     program->waitCreated();
-    if (program->state() == ObjectState::Building)
-        return program->problem(where, ErrorCode::InvalidArgument, "program.not_created", "wait() before create()");
+    if (program->state() == ObjectState::Building) {
+        const Error early =
+            program->problem(where, ErrorCode::InvalidArgument, "program.not_created", "wait() before create()");
+        program->device()->report(early);
+        return early;
+    }
     return error();
 }
 

@@ -7,7 +7,7 @@ namespace glint::test {
 
 namespace {
 
-class BufferTest : public ConformanceTest {
+class BufferTest : public ApiTest {
 protected:
     std::vector<uint8_t> bytes(size_t count) {
         std::vector<uint8_t> values(count);
@@ -16,6 +16,8 @@ protected:
     }
 };
 
+class BufferShaderTest : public ConformanceTest {};
+
 constexpr Buffer::Flag all_flags[] = {
     Buffer::FlagUniform, Buffer::FlagStorage, Buffer::FlagVertex,  Buffer::FlagIndex,   Buffer::FlagIndirect,
     Buffer::FlagTexel,   Buffer::FlagAddress, Buffer::FlagTracing, Buffer::FlagScratch, Buffer::FlagMapped,
@@ -23,7 +25,7 @@ constexpr Buffer::Flag all_flags[] = {
 
 }  // namespace
 
-TEST_F(BufferTest, KnowsItsProperties) {
+TEST_P(BufferTest, KnowsItsProperties) {
     const Buffer buffer = device.createBuffer(Buffer::FlagStorage | Buffer::FlagVertex, 1000, "numbers");
     ASSERT_TRUE(buffer);
     EXPECT_EQ(buffer.state(), ObjectState::Ready);
@@ -34,7 +36,7 @@ TEST_F(BufferTest, KnowsItsProperties) {
     EXPECT_FALSE(buffer.error());
 }
 
-TEST_F(BufferTest, NullBufferIsHarmless) {
+TEST_P(BufferTest, NullBufferIsHarmless) {
     const Buffer buffer;
     EXPECT_FALSE(buffer);
     EXPECT_EQ(buffer.state(), ObjectState::Null);
@@ -46,7 +48,7 @@ TEST_F(BufferTest, NullBufferIsHarmless) {
     EXPECT_EQ(buffer.name(), "");
 }
 
-TEST_F(BufferTest, HandlesShareAndMove) {
+TEST_P(BufferTest, HandlesShareAndMove) {
     Buffer a = makeBuffer(std::vector<uint32_t>{1});
     Buffer b = a;
     EXPECT_TRUE(a == b);
@@ -59,7 +61,7 @@ TEST_F(BufferTest, HandlesShareAndMove) {
     EXPECT_EQ(read<uint32_t>(c), std::vector<uint32_t>{1});
 }
 
-TEST_F(BufferTest, EveryFlagAloneAndTogether) {
+TEST_P(BufferTest, EveryFlagAloneAndTogether) {
     Buffer::Flags together = 0;
     for (const Buffer::Flag flag : all_flags) {
         if (flag == Buffer::FlagAddress && !device.getFeatures().bufferAddress) continue;
@@ -72,7 +74,7 @@ TEST_F(BufferTest, EveryFlagAloneAndTogether) {
     EXPECT_TRUE(device.createBuffer(Buffer::FlagNone, 256));
 }
 
-TEST_F(BufferTest, RoundTripOfEverySize) {
+TEST_P(BufferTest, RoundTripOfEverySize) {
     for (const size_t size : {1u, 2u, 3u, 4u, 5u, 15u, 16u, 17u, 255u, 256u, 257u, 65535u, 65536u, 65537u, 1u << 20,
                               (1u << 20) + 1, (9u << 20) + 3}) {
         const std::vector<uint8_t> expected = bytes(size);
@@ -80,14 +82,14 @@ TEST_F(BufferTest, RoundTripOfEverySize) {
     }
 }
 
-TEST_F(BufferTest, DataThenZeroes) {
+TEST_P(BufferTest, DataThenZeroes) {
     // What creation without data leaves is undefined; a fill defines it.
     const Buffer buffer = device.createBuffer(Buffer::FlagStorage, 64);
     device.clearBuffer(buffer);
     EXPECT_EQ(read<uint32_t>(buffer), std::vector<uint32_t>(16));
 }
 
-TEST_F(BufferTest, WritesAtOffsetsComeInOrder) {
+TEST_P(BufferTest, WritesAtOffsetsComeInOrder) {
     const Buffer buffer = makeBuffer(std::vector<uint8_t>(16));
     const std::vector<uint8_t> data = {1, 2, 3, 4, 5};
     device.setBuffer(buffer, 3, data.data(), 5);
@@ -97,7 +99,7 @@ TEST_F(BufferTest, WritesAtOffsetsComeInOrder) {
     EXPECT_EQ(read<uint8_t>(buffer), (std::vector<uint8_t>{0, 0, 0, 1, 2, 1, 4, 5, 0, 0, 0, 0, 0, 0, 0, 1}));
 }
 
-TEST_F(BufferTest, PartialReads) {
+TEST_P(BufferTest, PartialReads) {
     const Buffer buffer = makeBuffer(bytes(1000));
     const Expected<std::vector<uint8_t>> part = device.read<uint8_t>(buffer, 3, 10);
     ASSERT_THAT(part, IsOk());
@@ -109,7 +111,7 @@ TEST_F(BufferTest, PartialReads) {
     EXPECT_EQ(rest->size(), 10u);
 }
 
-TEST_F(BufferTest, CopiesWithinAndBetween) {
+TEST_P(BufferTest, CopiesWithinAndBetween) {
     const Buffer a = makeBuffer(bytes(100));
     const Buffer b = makeBuffer(std::vector<uint8_t>(100));
     device.copyBuffer(b, 7, a, 50, 13);
@@ -121,14 +123,14 @@ TEST_F(BufferTest, CopiesWithinAndBetween) {
     EXPECT_EQ(read<uint8_t>(b), expected);
 }
 
-TEST_F(BufferTest, FillsARange) {
+TEST_P(BufferTest, FillsARange) {
     const Buffer buffer = makeBuffer(std::vector<uint32_t>(8));
     device.clearBuffer(buffer, 0x01020304, 4, 8);
     device.clearBuffer(buffer, 0xffffffff, 28);
     EXPECT_EQ(read<uint32_t>(buffer), (std::vector<uint32_t>{0, 0x01020304, 0x01020304, 0, 0, 0, 0, 0xffffffff}));
 }
 
-TEST_F(BufferTest, MappedMemoryGoesBothWays) {
+TEST_F(BufferShaderTest, MappedMemoryGoesBothWays) {
     const Buffer buffer = device.createBuffer(Buffer::FlagMapped | Buffer::FlagStorage, 64, "mapped");
     ASSERT_TRUE(buffer);
     auto* values = static_cast<uint32_t*>(buffer.map());
@@ -147,7 +149,7 @@ TEST_F(BufferTest, MappedMemoryGoesBothWays) {
     for (uint32_t i = 0; i < 16; i++) EXPECT_EQ(values[i], 2 * i);
 }
 
-TEST_F(BufferTest, AddressesDifferAndAreStable) {
+TEST_P(BufferTest, AddressesDifferAndAreStable) {
     if (!device.getFeatures().bufferAddress) GTEST_SKIP() << "the adapter has no buffer addresses";
     const Buffer a = device.createBuffer(Buffer::FlagAddress, 256);
     const Buffer b = device.createBuffer(Buffer::FlagAddress, 256);
@@ -157,7 +159,7 @@ TEST_F(BufferTest, AddressesDifferAndAreStable) {
     EXPECT_EQ(device.createBuffer(Buffer::FlagStorage, 256).getAddress(), 0u);
 }
 
-TEST_F(BufferTest, ReleaseBeforeUseIsOver) {
+TEST_P(BufferTest, ReleaseBeforeUseIsOver) {
     const Buffer kept = makeBuffer(std::vector<uint8_t>(1 << 16));
     for (int i = 0; i < 20; i++) {
         const Buffer temporary = makeBuffer(bytes(1 << 16));
@@ -167,7 +169,7 @@ TEST_F(BufferTest, ReleaseBeforeUseIsOver) {
     EXPECT_EQ(read<uint8_t>(kept), bytes(1 << 16));
 }
 
-TEST_F(BufferTest, MemoryComesBack) {
+TEST_P(BufferTest, MemoryComesBack) {
     // The allocator may keep a block for the next object, but not more with each round.
     uint64_t after_first = 0;
     for (int round = 0; round < 4; round++) {
@@ -184,7 +186,7 @@ TEST_F(BufferTest, MemoryComesBack) {
     EXPECT_LE(device.getMemory().bytes, after_first);
 }
 
-TEST_F(BufferTest, ManyThreadsCreateAndRelease) {
+TEST_P(BufferTest, ManyThreadsCreateAndRelease) {
     std::vector<std::thread> threads;
     std::atomic<int> failures = 0;
     for (int t = 0; t < 4; t++)
@@ -199,5 +201,7 @@ TEST_F(BufferTest, ManyThreadsCreateAndRelease) {
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(failures, 0);
 }
+
+INSTANTIATE_APIS(BufferTest);
 
 }  // namespace glint::test

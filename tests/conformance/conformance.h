@@ -108,6 +108,17 @@ protected:
     }
 };
 
+/// The same body on every API: for what needs no shader to run.
+class ApiTest : public ConformanceTest, public ::testing::WithParamInterface<const char*> {
+protected:
+    ApiTest() : ConformanceTest(GetParam()) {}
+};
+
+/// INSTANTIATE_APIS(BufferTest);
+#define INSTANTIATE_APIS(suite)                                                \
+    INSTANTIATE_TEST_SUITE_P(Apis, suite, ::testing::Values("vulkan", "null"), \
+                             [](const auto& api) { return std::string(api.param); })
+
 /// How many pixels have this colour.
 inline size_t countPixels(const std::vector<Pixel>& pixels, const Pixel& color) {
     return static_cast<size_t>(std::count(pixels.begin(), pixels.end(), color));

@@ -7,11 +7,8 @@ namespace glint::test {
 
 namespace {
 
-/// The same body on every API.
-class DeviceApiTest : public ConformanceTest, public ::testing::WithParamInterface<const char*> {
+class DeviceTests : public ApiTest {
 protected:
-    DeviceApiTest() : ConformanceTest(GetParam()) {}
-
     DeviceDesc desc(const MessageLog& messages) const {
         return {.api = GetParam(), .validation = DeviceDesc::Validation::On, .message = messages.callback()};
     }
@@ -19,7 +16,7 @@ protected:
 
 }  // namespace
 
-TEST_P(DeviceApiTest, SaysWhatItIs) {
+TEST_P(DeviceTests, SaysWhatItIs) {
     const DeviceInfo& info = device.getInfo();
     EXPECT_EQ(info.api, GetParam());
     EXPECT_FALSE(info.name.empty());
@@ -33,7 +30,7 @@ TEST_P(DeviceApiTest, SaysWhatItIs) {
     EXPECT_EQ((*adapters)[info.index].features, info.features);
 }
 
-TEST_P(DeviceApiTest, FeaturesAreThoseAskedFor) {
+TEST_P(DeviceTests, FeaturesAreThoseAskedFor) {
     const Features& features = device.getFeatures();
     EXPECT_EQ(features.mask & ~device.getInfo().features, 0u);
     EXPECT_EQ(features.computeTracing, features.has(FeatureComputeTracing));
@@ -59,7 +56,7 @@ TEST_P(DeviceApiTest, FeaturesAreThoseAskedFor) {
     messages.expectNone();
 }
 
-TEST_P(DeviceApiTest, EveryFeatureByItself) {
+TEST_P(DeviceTests, EveryFeatureByItself) {
     for (uint32_t i = 0; i < FeatureCount; i++) {
         const FeatureMask feature = 1ull << i;
         if (!(device.getInfo().features & feature)) continue;
@@ -75,7 +72,7 @@ TEST_P(DeviceApiTest, EveryFeatureByItself) {
     }
 }
 
-TEST_P(DeviceApiTest, LimitsAreUsable) {
+TEST_P(DeviceTests, LimitsAreUsable) {
     const Features& features = device.getFeatures();
     EXPECT_GE(features.maxTexture2DSize, 4096u);
     EXPECT_GE(features.maxTexture3DSize, 256u);
@@ -102,7 +99,7 @@ TEST_P(DeviceApiTest, LimitsAreUsable) {
     if (features.has(FeatureTimestamps)) { EXPECT_GT(features.timestampPeriod, 0.0); }
 }
 
-TEST_P(DeviceApiTest, FormatsThatEveryAdapterHas) {
+TEST_P(DeviceTests, FormatsThatEveryAdapterHas) {
     EXPECT_TRUE(device.hasTexture(FormatRGBAu8n, Texture::FlagTarget | Texture::FlagSurface));
     EXPECT_TRUE(device.hasTexture(FormatRGBAf32, Texture::FlagSurface));
     EXPECT_TRUE(device.hasTexture(FormatRf32, Texture::FlagMipmaps));
@@ -114,7 +111,7 @@ TEST_P(DeviceApiTest, FormatsThatEveryAdapterHas) {
     EXPECT_FALSE(device.hasTexture(FormatDf32, Texture::FlagSurface));
 }
 
-TEST_P(DeviceApiTest, NullDeviceIsHarmless) {
+TEST_P(DeviceTests, NullDeviceIsHarmless) {
     Device nobody;
     EXPECT_FALSE(nobody);
     EXPECT_FALSE(nobody.check());
@@ -164,7 +161,7 @@ TEST_P(DeviceApiTest, NullDeviceIsHarmless) {
     EXPECT_THAT(nobody.getTime(Query()), HasErrorId("handle.null"));
 }
 
-TEST_P(DeviceApiTest, ObjectsOutliveTheirDevice) {
+TEST_P(DeviceTests, ObjectsOutliveTheirDevice) {
     MessageLog messages;
     {
         Buffer buffer;
@@ -194,7 +191,7 @@ TEST_P(DeviceApiTest, ObjectsOutliveTheirDevice) {
     messages.expectNone();
 }
 
-TEST_P(DeviceApiTest, RecordersOutliveTheirDevice) {
+TEST_P(DeviceTests, RecordersOutliveTheirDevice) {
     MessageLog messages;
     {
         Device other = Device::create(desc(messages));
@@ -208,7 +205,7 @@ TEST_P(DeviceApiTest, RecordersOutliveTheirDevice) {
     messages.expectNone();
 }
 
-TEST_P(DeviceApiTest, CreatedAndDroppedManyTimes) {
+TEST_P(DeviceTests, CreatedAndDroppedManyTimes) {
     for (int i = 0; i < 3; i++) {
         MessageLog messages;
         {
@@ -219,7 +216,7 @@ TEST_P(DeviceApiTest, CreatedAndDroppedManyTimes) {
     }
 }
 
-TEST_P(DeviceApiTest, ErrorsComeAtOnceAndAreCarried) {
+TEST_P(DeviceTests, ErrorsComeAtOnceAndAreCarried) {
     MessageLog messages;
     {
         Device other = Device::create(desc(messages));
@@ -243,7 +240,7 @@ TEST_P(DeviceApiTest, ErrorsComeAtOnceAndAreCarried) {
     messages.expectNone();
 }
 
-TEST_P(DeviceApiTest, QueuedTransfersArePlayedInOrder) {
+TEST_P(DeviceTests, QueuedTransfersArePlayedInOrder) {
     const Buffer buffer = makeBuffer(std::vector<uint32_t>(4));
     device.clearBuffer(buffer, 1);
     const uint32_t two = 2;
@@ -253,7 +250,7 @@ TEST_P(DeviceApiTest, QueuedTransfersArePlayedInOrder) {
     EXPECT_EQ(read<uint32_t>(buffer), (std::vector<uint32_t>{1, 2, 2, 1}));
 }
 
-TEST_P(DeviceApiTest, FlushesOfResourcesAreAccepted) {
+TEST_P(DeviceTests, FlushesOfResourcesAreAccepted) {
     const Buffer buffer = makeBuffer(std::vector<uint32_t>(4));
     const Texture texture = makeTexture(FormatRGBAu8n, 4, 4);
     device.flushBuffer(buffer);
@@ -263,7 +260,7 @@ TEST_P(DeviceApiTest, FlushesOfResourcesAreAccepted) {
     EXPECT_THAT(device.finish(), IsOk());
 }
 
-TEST_P(DeviceApiTest, AdapterByIndexAndName) {
+TEST_P(DeviceTests, AdapterByIndexAndName) {
     MessageLog messages;
     DeviceDesc chosen = desc(messages);
     chosen.adapter = std::to_string(device.getInfo().index);
@@ -273,7 +270,6 @@ TEST_P(DeviceApiTest, AdapterByIndexAndName) {
     messages.expectNone();
 }
 
-INSTANTIATE_TEST_SUITE_P(Apis, DeviceApiTest, ::testing::Values("vulkan", "null"),
-                         [](const auto& api) { return std::string(api.param); });
+INSTANTIATE_APIS(DeviceTests);
 
 }  // namespace glint::test

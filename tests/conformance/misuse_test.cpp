@@ -13,10 +13,7 @@ std::vector<Misuse>& misuses() {
 
 namespace {
 
-class MisuseTest : public DeviceTest, public ::testing::WithParamInterface<const char*> {
-protected:
-    MisuseTest() : DeviceTest(GetParam()) {}
-};
+class MisuseTest : public ApiTest {};
 
 std::vector<Misuse> sorted() {
     std::vector<Misuse> all = misuses();
@@ -48,8 +45,7 @@ TEST_P(MisuseTest, IsCarriedAndTold) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Apis, MisuseTest, ::testing::Values("vulkan", "null"),
-                         [](const auto& api) { return std::string(api.param); });
+INSTANTIATE_APIS(MisuseTest);
 
 TEST(MisuseCount, IsAtLeast120) {
     std::set<std::pair<std::string, std::string>> distinct;

@@ -1,4 +1,7 @@
 #include "conformance/conformance.h"
+#include "support/files.h"
+
+#include <glint/base/file.h>
 
 namespace glint::test {
 
@@ -293,6 +296,85 @@ TEST_F(PipelineTest, GeometryShader) {
         list.drawArrays(1);
     });
     EXPECT_EQ(countPixels(readTexture<Pixel>(color), red), 16u);
+}
+
+TEST_F(PipelineTest, Tessellation) {
+    if (!device.getFeatures().has(FeatureTessellation)) GTEST_SKIP() << "the adapter has no tessellation";
+    const Pipeline pipeline = makePipeline(
+        "void main() { gl_Position = vec4(vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 4.0 - 1.0, 0.5, 1.0); }",
+        red_fragment, [](Pipeline& p) {
+            p.setPrimitive(Pipeline::PrimitivePatch);
+            p.createShaderGLSL(Shader::TypeControl, R"(
+                layout(vertices = 3) out;
+                void main() {
+                    gl_out[gl_InvocationID].gl_Position = gl_in[gl_InvocationID].gl_Position;
+                    gl_TessLevelOuter[0] = gl_TessLevelOuter[1] = gl_TessLevelOuter[2] = gl_TessLevelInner[0] = 4.0;
+                })");
+            p.createShaderGLSL(Shader::TypeEvaluate, R"(
+                layout(triangles, equal_spacing, ccw) in;
+                void main() {
+                    gl_Position = gl_TessCoord.x * gl_in[0].gl_Position + gl_TessCoord.y * gl_in[1].gl_Position +
+                                  gl_TessCoord.z * gl_in[2].gl_Position;
+                })");
+        });
+    const Texture color = makeTexture(FormatRGBAu8n, 8, 8);
+    draw(color, [&](Command& list) {
+        list.setPipeline(pipeline);
+        list.drawArrays(3);
+    });
+    EXPECT_EQ(countPixels(readTexture<Pixel>(color), red), 64u);
+}
+
+TEST_F(PipelineTest, ReloadFollowsTheFile) {
+    const TempDir folder;
+    const std::filesystem::path path = folder / "color.shader";
+    const std::string blue_fragment =
+        "layout(location = 0) out vec4 color;\nvoid main() { color = vec4(0.0, 0.0, 1.0, 1.0); }\n";
+    ASSERT_THAT(writeTextFile(path, red_fragment), IsOk());
+    Pipeline pipeline = device.createPipeline("reloaded");
+    pipeline.createShaderGLSL(Shader::TypeVertex, cover_vertex);
+    ASSERT_TRUE(pipeline.loadShaderGLSL(Shader::TypeFragment, path.string()));
+    pipeline.setColorFormat(FormatRGBAu8n);
+    ASSERT_THAT(pipeline.create(), IsOk());
+    const Texture color = makeTexture(FormatRGBAu8n, 4, 4);
+    const auto drawn = [&] {
+        draw(color, [&](Command& list) {
+            list.setPipeline(pipeline);
+            list.drawArrays(3);
+        });
+        return readTexture<Pixel>(color)[0];
+    };
+    EXPECT_EQ(drawn(), red);
+    ASSERT_THAT(writeTextFile(path, blue_fragment + "\n"), IsOk());
+    bool changed = false;
+    EXPECT_THAT(pipeline.reload(&changed), IsOk());
+    EXPECT_TRUE(changed);
+    EXPECT_EQ(drawn(), blue);
+    // What the state forbids is refused, and the pipeline stays as it was.
+    ASSERT_THAT(writeTextFile(path, "layout(location = 1) out vec4 color;\nvoid main() { color = vec4(1.0); }\n\n\n"),
+                IsOk());
+    expectError("pipeline.format", [&] { return pipeline.reload(&changed); });
+    EXPECT_FALSE(changed);
+    EXPECT_EQ(drawn(), blue);
+}
+
+TEST_F(PipelineTest, AlphaToCoverage) {
+    const Texture color = makeTexture(FormatRGBAu8n, 4, 4, Texture::FlagTarget | Texture::FlagMultisample4);
+    const Texture resolved = makeTexture(FormatRGBAu8n, 4, 4);
+    Target target = device.createTarget(color);
+    target.setColorResolve(0, resolved);
+    const Pipeline pipeline = makePipeline(cover_vertex, push_fragment, [](Pipeline& p) {
+        p.setMultisample(4);
+        p.setAlphaToCoverage(true);
+    });
+    for (const float alpha : {0.0f, 0.5f, 1.0f}) {
+        Command list = device.createCommand(target);
+        list.setPipeline(pipeline);
+        list.setPushConstants(Color{1, 0, 0, alpha});
+        list.drawArrays(3);
+        submit(list);
+        EXPECT_NEAR(readTexture<Pixel>(resolved)[5][0], alpha * 255, 1) << alpha;
+    }
 }
 
 }  // namespace glint::test

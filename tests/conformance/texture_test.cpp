@@ -7,7 +7,7 @@ namespace glint::test {
 
 namespace {
 
-class TextureTest : public ConformanceTest {
+class TextureTest : public ApiTest {
 protected:
     /// Bytes that are no special values in any format: exponents stay small, so that no copy meets a NaN.
     static std::vector<uint8_t> pattern(uint64_t size, uint32_t seed = 0) {
@@ -31,6 +31,8 @@ protected:
     }
 };
 
+class TextureShaderTest : public ConformanceTest {};
+
 /// Formats whose bytes come back as they went in: all but those with depth, whose copies may round or drop bits.
 std::vector<Format> exactFormats() {
     std::vector<Format> formats;
@@ -41,7 +43,7 @@ std::vector<Format> exactFormats() {
 
 }  // namespace
 
-TEST_F(TextureTest, KnowsItsProperties) {
+TEST_P(TextureTest, KnowsItsProperties) {
     const Texture texture =
         device.createTexture2D(FormatRGBAf16, 33, 20, Texture::FlagMipmaps | Texture::FlagSurface, "picture");
     ASSERT_TRUE(texture);
@@ -60,7 +62,7 @@ TEST_F(TextureTest, KnowsItsProperties) {
     EXPECT_EQ(texture.name(), "picture");
 }
 
-TEST_F(TextureTest, NullTextureIsHarmless) {
+TEST_P(TextureTest, NullTextureIsHarmless) {
     const Texture texture;
     EXPECT_FALSE(texture);
     EXPECT_EQ(texture.getWidth() + texture.getHeight() + texture.getDepth() + texture.getLayers(), 0u);
@@ -69,7 +71,7 @@ TEST_F(TextureTest, NullTextureIsHarmless) {
     EXPECT_EQ(texture.getDataSize(100), 0u);
 }
 
-TEST_F(TextureTest, RoundTripOfEveryFormat) {
+TEST_P(TextureTest, RoundTripOfEveryFormat) {
     int tested = 0;
     for (const Format format : exactFormats()) {
         if (!device.hasTexture(format)) continue;
@@ -82,7 +84,7 @@ TEST_F(TextureTest, RoundTripOfEveryFormat) {
     EXPECT_GE(tested, 30);
 }
 
-TEST_F(TextureTest, RoundTripOfEveryType) {
+TEST_P(TextureTest, RoundTripOfEveryType) {
     roundTrip(device.createTexture({.format = FormatRGBAu8n, .width = 13, .height = 7, .layers = 5, .mipmaps = 3}));
     roundTrip(device.createTexture3D(FormatRGBAu8n, 9, 6, 5, Texture::FlagMipmaps));
     roundTrip(device.createTextureCube(FormatRGBAf16, 16, Texture::FlagMipmaps));
@@ -93,7 +95,7 @@ TEST_F(TextureTest, RoundTripOfEveryType) {
             {.type = Texture::TypeCube, .format = FormatRGBAu8n, .width = 8, .height = 8, .layers = 2}));
 }
 
-TEST_F(TextureTest, DepthRoundTrip) {
+TEST_P(TextureTest, DepthRoundTrip) {
     for (const Format format : {FormatDu16n, FormatDf32}) {
         if (!device.hasTexture(format, Texture::FlagTarget)) continue;
         const Texture texture = makeTexture(format, 8, 8);
@@ -108,7 +110,7 @@ TEST_F(TextureTest, DepthRoundTrip) {
     }
 }
 
-TEST_F(TextureTest, RegionsAndSlices) {
+TEST_P(TextureTest, RegionsAndSlices) {
     const Texture texture =
         device.createTexture({.format = FormatRu32, .width = 8, .height = 8, .layers = 3, .mipmaps = 2});
     device.clearTexture(texture, Color{1, 0, 0, 0});
@@ -125,7 +127,7 @@ TEST_F(TextureTest, RegionsAndSlices) {
     EXPECT_EQ(readTexture<uint32_t>(texture, {.layer = 0, .layers = 1}), std::vector<uint32_t>(64, 1));
 }
 
-TEST_F(TextureTest, RegionOfACompressedTexture) {
+TEST_P(TextureTest, RegionOfACompressedTexture) {
     if (!device.hasTexture(FormatBC1RGBAu8n)) GTEST_SKIP() << "the adapter has no block compression";
     const Texture texture = device.createTexture2D(FormatBC1RGBAu8n, 16, 16);
     const std::vector<uint8_t> all = pattern(128);
@@ -137,7 +139,7 @@ TEST_F(TextureTest, RegionOfACompressedTexture) {
     EXPECT_EQ(readTexture<uint8_t>(texture), expected);
 }
 
-TEST_F(TextureTest, CopiesBetweenTextures) {
+TEST_P(TextureTest, CopiesBetweenTextures) {
     const Texture a = device.createTexture({.format = FormatRu32, .width = 8, .height = 8, .mipmaps = 2});
     const Texture b = device.createTexture({.format = FormatRGBAu8n, .width = 8, .height = 8, .layers = 2});
     std::vector<uint32_t> data(64);
@@ -152,7 +154,7 @@ TEST_F(TextureTest, CopiesBetweenTextures) {
     EXPECT_EQ(readTexture<uint32_t>(b, {.layer = 0, .layers = 1}), std::vector<uint32_t>(64));
 }
 
-TEST_F(TextureTest, CopiesToAndFromBuffers) {
+TEST_P(TextureTest, CopiesToAndFromBuffers) {
     const Texture texture = device.createTexture2D(FormatRu32, 8, 4);
     device.clearTexture(texture, Color{9, 0, 0, 0});
     const Buffer buffer = makeBuffer(std::vector<uint32_t>{0, 1, 2, 3, 4, 5, 6, 7});
@@ -163,7 +165,7 @@ TEST_F(TextureTest, CopiesToAndFromBuffers) {
     EXPECT_EQ(read<uint32_t>(buffer), (std::vector<uint32_t>{0, 1, 2, 3, 9, 2, 3, 9}));
 }
 
-TEST_F(TextureTest, ClearsEveryClassOfFormat) {
+TEST_P(TextureTest, ClearsEveryClassOfFormat) {
     const auto cleared = [&](Format format, const Color& color) {
         const Texture texture = device.createTexture2D(format, 2, 2);
         device.clearTexture(texture, color);
@@ -181,7 +183,7 @@ TEST_F(TextureTest, ClearsEveryClassOfFormat) {
     EXPECT_EQ(value, -1.5f);
 }
 
-TEST_F(TextureTest, MipmapsAverage) {
+TEST_F(TextureShaderTest, MipmapsAverage) {
     const Texture texture = device.createTexture2D(FormatRf32, 8, 8, Texture::FlagMipmaps);
     std::vector<float> data(64);
     for (size_t i = 0; i < 64; i++) data[i] = static_cast<float>(i);
@@ -194,7 +196,7 @@ TEST_F(TextureTest, MipmapsAverage) {
     EXPECT_NEAR(readTexture<float>(texture, {.mip = 3, .mips = 1})[0], 31.5f, 1e-4);
 }
 
-TEST_F(TextureTest, MipmapsOfCubesAndArraysAndVolumes) {
+TEST_P(TextureTest, MipmapsOfCubesAndArraysAndVolumes) {
     for (const Texture& texture :
          {device.createTextureCube(FormatRGBAu8n, 8, Texture::FlagMipmaps),
           device.createTexture(
@@ -213,7 +215,7 @@ TEST_F(TextureTest, MipmapsOfCubesAndArraysAndVolumes) {
     }
 }
 
-TEST_F(TextureTest, SurfacesOfEveryFormatThatCanBeOne) {
+TEST_F(TextureShaderTest, SurfacesOfEveryFormatThatCanBeOne) {
     struct Case {
         Format format;
         const char* qualifier;
@@ -252,7 +254,7 @@ TEST_F(TextureTest, SurfacesOfEveryFormatThatCanBeOne) {
     }
 }
 
-TEST_F(TextureTest, SurfaceOfAMipLevelAndALayer) {
+TEST_F(TextureShaderTest, SurfaceOfAMipLevelAndALayer) {
     const Texture texture = device.createTexture(
         {.format = FormatRu32, .width = 8, .height = 8, .layers = 2, .mipmaps = 3, .flags = Texture::FlagSurface});
     device.clearTexture(texture, Color{0, 0, 0, 0});
@@ -268,7 +270,7 @@ TEST_F(TextureTest, SurfaceOfAMipLevelAndALayer) {
     EXPECT_EQ(readTexture<uint32_t>(texture, {2, 1, 0, 1}), std::vector<uint32_t>(4, 0));
 }
 
-TEST_F(TextureTest, SampledTypes) {
+TEST_F(TextureShaderTest, SampledTypes) {
     const Texture array = device.createTexture({.format = FormatRu32, .width = 2, .height = 2, .layers = 3});
     const Texture volume = device.createTexture3D(FormatRu32, 2, 2, 2);
     const Texture cube = device.createTextureCube(FormatRf32, 2);
@@ -306,7 +308,102 @@ TEST_F(TextureTest, SampledTypes) {
               (std::vector<uint32_t>{10, 11, 12, 5, 20, 21, 22, 23, 24, 25, 12}));
 }
 
-TEST_F(TextureTest, SrgbIsDecodedWhenSampled) {
+TEST_F(TextureShaderTest, CubeArrays) {
+    if (!device.getFeatures().has(FeatureCubeArray)) GTEST_SKIP() << "the adapter has no arrays of cubes";
+    const Texture cubes =
+        device.createTexture({.type = Texture::TypeCube, .format = FormatRf32, .width = 2, .height = 2, .layers = 2});
+    EXPECT_EQ(cubes.getLayers(), 12u);
+    for (uint16_t face = 0; face < 12; face++) device.clearTexture(cubes, Color{1.0f + face, 0, 0, 0}, {0, 1, face, 1});
+    const Buffer result = makeBuffer(std::vector<float>(4));
+    compute([&](Compute& list) {
+        list.setKernel(makeKernel(R"(
+            layout(local_size_x = 1) in;
+            layout(binding = 0) uniform samplerCubeArray cubes;
+            layout(binding = 1) uniform samplerCube cube;
+            layout(binding = 2) buffer Result { vec4 result; };
+            void main() {
+                result.x = textureLod(cubes, vec4(1, 0, 0, 0), 0.0).x;
+                result.y = textureLod(cubes, vec4(0, 0, -1, 1), 0.0).x;
+                result.z = textureLod(cube, vec3(0, 1, 0), 0.0).x;
+            })"));
+        list.setTexture(0, cubes);
+        list.setTexture(1, cubes, Slice{.layer = 6, .layers = 6});
+        list.setSamplers(0, {device.createSampler(Sampler::FilterPoint), device.createSampler(Sampler::FilterPoint)});
+        list.setStorageBuffer(0, result);
+        list.dispatch(1);
+    });
+    EXPECT_EQ(read<float>(result), (std::vector<float>{1, 12, 9, 0}));
+}
+
+TEST_F(TextureShaderTest, MipLevelsOfAView) {
+    const Texture texture = device.createTexture2D(FormatRf32, 8, 8, Texture::FlagMipmaps);
+    for (uint16_t mip = 0; mip < 4; mip++) device.clearTexture(texture, Color{10.0f + mip, 0, 0, 0}, {mip, 1, 0, 1});
+    const Buffer result = makeBuffer(std::vector<float>(4));
+    compute([&](Compute& list) {
+        list.setKernel(makeKernel(R"(
+            layout(local_size_x = 1) in;
+            layout(binding = 0) uniform sampler2D picture;
+            layout(binding = 1) buffer Result { vec4 result; };
+            void main() {
+                result = vec4(textureLod(picture, vec2(0.5), 0.0).x, textureLod(picture, vec2(0.5), 1.0).x,
+                              textureQueryLevels(picture), textureSize(picture, 0).x);
+            })"));
+        list.setTexture(0, texture, Slice{.mip = 1, .mips = 2});
+        list.setSampler(0, device.createSampler(Sampler::FilterBipoint));
+        list.setStorageBuffer(0, result);
+        list.dispatch(1);
+    });
+    EXPECT_EQ(read<float>(result), (std::vector<float>{11, 12, 2, 4}));
+}
+
+TEST_F(TextureShaderTest, ReadOneLevelWriteTheNext) {
+    // One texture sampled and stored at the same time, in different mip levels.
+    const Texture texture = device.createTexture2D(FormatRf32, 8, 8, Texture::FlagMipmaps | Texture::FlagSurface);
+    device.clearTexture(texture, Color{3, 0, 0, 0});
+    const Kernel kernel = makeKernel(R"(
+        layout(local_size_x = 4, local_size_y = 4) in;
+        layout(binding = 0) uniform sampler2D source;
+        layout(binding = 1, r32f) writeonly uniform image2D result;
+        void main() {
+            ivec2 i = ivec2(gl_GlobalInvocationID.xy);
+            if (all(lessThan(i, imageSize(result)))) imageStore(result, i, texelFetch(source, i * 2, 0) * 2.0);
+        })");
+    const Sampler sampler = device.createSampler(Sampler::FilterPoint);
+    compute([&](Compute& list) {
+        list.setKernel(kernel);
+        list.setSampler(0, sampler);
+        for (uint16_t mip = 1; mip < 4; mip++) {
+            list.setTexture(0, texture, Slice{.mip = static_cast<uint16_t>(mip - 1), .mips = 1});
+            list.setSurfaceTexture(0, texture, {.mip = mip, .mips = 1});
+            list.dispatch(8 >> mip, 8 >> mip);
+        }
+    });
+    for (uint16_t mip = 0; mip < 4; mip++)
+        EXPECT_EQ(readTexture<float>(texture, {.mip = mip, .mips = 1})[0], static_cast<float>(3 << mip));
+}
+
+TEST_F(TextureShaderTest, SamplesOfAMultisampledTexture) {
+    const Texture texture = makeTexture(FormatRGBAu8n, 4, 4, Texture::FlagTarget | Texture::FlagMultisample4);
+    Target target = device.createTarget(texture);
+    target.setClearColor(Color{0.2f, 0, 0, 1});
+    Command clear = device.createCommand(target);
+    submit(clear);
+    const Buffer result = makeBuffer(std::vector<float>(4));
+    compute([&](Compute& list) {
+        list.setKernel(makeKernel(R"(
+            layout(local_size_x = 1) in;
+            layout(binding = 0) uniform sampler2DMS samples;
+            layout(binding = 1) buffer Result { float result[4]; };
+            void main() { for (int i = 0; i < 4; i++) result[i] = texelFetch(samples, ivec2(2), i).x; })"));
+        list.setTexture(0, texture);
+        list.setSampler(0, device.createSampler());
+        list.setStorageBuffer(0, result);
+        list.dispatch(1);
+    });
+    for (const float value : read<float>(result)) EXPECT_NEAR(value, 0.2f, 1e-3);
+}
+
+TEST_F(TextureShaderTest, SrgbIsDecodedWhenSampled) {
     const Texture texture = makeTexture(FormatRGBAu8ns, 1, 1, 0);
     device.setTexture(texture, Pixel{188, 0, 255, 128}.data(), 4);
     const Buffer result = makeBuffer(std::vector<float>(4));
@@ -329,7 +426,7 @@ TEST_F(TextureTest, SrgbIsDecodedWhenSampled) {
     EXPECT_NEAR(value[3], 128 / 255.0, 1e-3);
 }
 
-TEST_F(TextureTest, ReleaseBeforeUseIsOver) {
+TEST_P(TextureTest, ReleaseBeforeUseIsOver) {
     const Texture kept = makeTexture(FormatRGBAu8n, 64, 64, 0);
     for (int i = 0; i < 10; i++) {
         const Texture temporary = makeTexture(FormatRGBAu8n, 64, 64, 0);
@@ -339,5 +436,7 @@ TEST_F(TextureTest, ReleaseBeforeUseIsOver) {
     }
     EXPECT_EQ(countPixels(readTexture<Pixel>(kept), green), 64u * 64);
 }
+
+INSTANTIATE_APIS(TextureTest);
 
 }  // namespace glint::test

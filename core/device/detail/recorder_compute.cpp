@@ -15,7 +15,7 @@ constexpr uint64_t inline_limit = 1u << 20;
 
 void RecorderCore::setKernel(const Kernel& kernel, Where where) {
     if (!recording(where)) return;
-    if (kernel.state() == ObjectState::Building) (void)kernel.wait();
+    if (kernel.state() == ObjectState::Building) static_cast<KernelObject*>(kernel.object())->waitCreated();
     if (usable(kernel, "setKernel", where)) setProgram(*static_cast<KernelObject*>(kernel.object()));
 }
 

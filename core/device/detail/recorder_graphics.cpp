@@ -97,7 +97,7 @@ void RecorderCore::beginTarget(TargetObject& target, Where where) {
 
 void RecorderCore::setPipeline(const Pipeline& pipeline, Where where) {
     if (!recording(where)) return;
-    if (pipeline.state() == ObjectState::Building) (void)pipeline.wait();
+    if (pipeline.state() == ObjectState::Building) static_cast<PipelineObject*>(pipeline.object())->waitCreated();
     if (!usable(pipeline, "setPipeline", where)) return;
     auto* object = static_cast<PipelineObject*>(pipeline.object());
     const PipelineDesc& desc = object->desc;

@@ -9,9 +9,6 @@
 #endif
 #include <vulkan/vulkan_core.h>
 
-// Vulkan's structures begin as `= {type}`: the rest of them zero, to be filled member by member.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-
 namespace glint::vulkan {
 
 #define GLINT_VULKAN_GLOBAL_FUNCTIONS(X) \

@@ -143,6 +143,7 @@ std::shared_ptr<Instance> Instance::adopt(VkInstance handle, PFN_vkGetInstancePr
     instance->handle = handle;
     instance->vk.load(get, handle);
     instance->debug_utils = instance->vk.SetDebugUtilsObjectNameEXT != nullptr;
+    instance->validation = true;
     return instance;
 }
 

@@ -29,7 +29,7 @@ public:
     VkInstance handle = VK_NULL_HANDLE;
     InstanceFunctions vk;
     bool debug_utils = false;  ///< names, regions and messages
-    bool validation = false;   ///< the Khronos layer is there
+    bool validation = false;   ///< the Khronos layer is there, or may be
     bool owned = false;
 
 private:

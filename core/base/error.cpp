@@ -87,7 +87,9 @@ const std::string& Error::file() const { return data_ ? data_->file : empty; }
 uint32_t Error::line() const { return data_ ? data_->line : 0; }
 const std::string& Error::context() const { return data_ ? data_->context : empty; }
 
-std::string Error::text() const {
+std::string Error::text() const { return data_ ? fmt::format("{} [{}]", summary(), data_->id) : std::string(); }
+
+std::string Error::summary() const {
     if (!data_) return {};
     std::string text;
     if (!data_->file.empty()) {
@@ -96,7 +98,7 @@ std::string Error::text() const {
         if (!data_->context.empty()) text += fmt::format(" ({})", data_->context);
         text += ": ";
     }
-    return text + fmt::format("{} [{}]", data_->message, data_->id);
+    return text + data_->message;
 }
 
 }  // namespace glint

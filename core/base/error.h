@@ -57,8 +57,10 @@ public:
     uint32_t line() const;
     const std::string& context() const;
 
-    /// "hello.cpp:14: dispatch: storage buffer 0 'values' has 16 bytes, ... [core.storage_too_small]"
+    /// "hello.cpp:14: dispatch: storage 0 'Values' of kernel 'scale' needs at least 64 bytes, ... [bind.storage_size]"
     std::string text() const;
+    /// The same without the id.
+    std::string summary() const;
 
 private:
     struct Data;

@@ -57,7 +57,7 @@ VKAPI_ATTR VkBool32 VKAPI_CALL sendToLog(VkDebugUtilsMessageSeverityFlagBitsEXT 
                                          VkDebugUtilsMessageTypeFlagsEXT,
                                          const VkDebugUtilsMessengerCallbackDataEXT* data, void*) {
     const bool error = severity >= VK_DEBUG_UTILS_MESSAGE_SEVERITY_ERROR_BIT_EXT;
-    log(error ? LogLevel::Error : LogLevel::Warning, "vulkan.validation", messageError(*data).text());
+    log(error ? LogLevel::Error : LogLevel::Warning, "vulkan.validation", messageError(*data).summary());
     return VK_FALSE;
 }
 

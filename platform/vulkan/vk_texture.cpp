@@ -64,7 +64,8 @@ uint32_t textureSupport(const VulkanDevice& device, Format format, Texture::Type
     if (features & VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT) support |= supports_sampling;
     constexpr VkFormatFeatureFlags blits = VK_FORMAT_FEATURE_BLIT_SRC_BIT | VK_FORMAT_FEATURE_BLIT_DST_BIT;
     if ((features & blits) == blits) support |= Texture::FlagMipmaps;
-    if ((features & VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT) &&
+    // GLSL has no image formats for depth, whatever a driver offers.
+    if ((features & VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT) && !info.depth &&
         sampleCounts(device, format, type, Texture::FlagSurface, features)) {
         support |= Texture::FlagSurface;
     }

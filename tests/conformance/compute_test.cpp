@@ -446,6 +446,7 @@ TEST_F(ComputeTest, UntrackedWithBarriers) {
         list.setUniform(0, AddParameters{64, 1});
         list.setStorageBuffer(0, buffer);
         list.setTracking(false);
+        list.barrier(buffer);  // the upload comes before, too
         for (uint32_t i = 0; i < 5; i++) {
             list.dispatch(64);
             list.barrier(buffer);

@@ -191,8 +191,8 @@ TEST_F(TargetTest, ResolvesSamples) {
             p.setDepthFormat(FormatDf32);
             p.setDepthFunc(Pipeline::DepthFuncLess);
         });
-        // A slanted edge: pixels on it get some of the samples.
-        const std::array<float, 4> triangle[] = {{-1, -1, 0.5f, 1}, {1, -1, 0.5f, 1}, {-1, 0.9f, 0.5f, 1}};
+        // A slanted edge, not along the diagonal of a pixel: pixels on it get some of the samples, wherever those lie.
+        const std::array<float, 4> triangle[] = {{-1, -1, 0.5f, 1}, {1.3f, -1, 0.5f, 1}, {-1, 0.5f, 0.5f, 1}};
         Command list = device.createCommand(target);
         list.setPipeline(pipeline);
         list.setVertices(0, triangle);

@@ -79,7 +79,7 @@ void DeviceObject::adopt(std::unique_ptr<Backend> made, MessageCallback message)
 
 void DeviceObject::report(const Error& error, Message::Severity severity) const {
     if (message_) return message_({severity, error});
-    log(severity == Message::Severity::Error ? LogLevel::Error : LogLevel::Warning, error.id(), error.text());
+    log(severity == Message::Severity::Error ? LogLevel::Error : LogLevel::Warning, error.id(), error.summary());
 }
 
 Status DeviceObject::failed(Error error, Where where) {

@@ -440,7 +440,7 @@ const BindingLayout& Program::getLayout() const {
     return *this ? static_cast<const ProgramObject*>(object_)->layout : empty;
 }
 
-bool Program::load(Shader shader, Where where) {
+bool Program::load(const Shader& shader, Where where) {
     setShader(shader, where);
     return static_cast<bool>(shader) && state() == ObjectState::Building;
 }

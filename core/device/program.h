@@ -56,7 +56,7 @@ public:
     const BindingLayout& getLayout() const;
 
 protected:
-    bool load(Shader shader, Where where);
+    bool load(const Shader& shader, Where where);
     void declareSlots(SlotKind kind, uint32_t first, uint32_t count, ShaderMask mask, Where where);
 };
 

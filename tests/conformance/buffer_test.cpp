@@ -56,7 +56,8 @@ TEST_P(BufferTest, HandlesShareAndMove) {
     EXPECT_EQ(a.name(), "renamed");
     Buffer c = std::move(a);
     EXPECT_TRUE(b == c);
-    c = c;
+    const Buffer& same = c;
+    c = same;
     b = Buffer();
     EXPECT_EQ(read<uint32_t>(c), std::vector<uint32_t>{1});
 }
@@ -175,8 +176,8 @@ TEST_P(BufferTest, MemoryComesBack) {
     for (int round = 0; round < 4; round++) {
         const uint64_t created = device.getMemory().objects_created;
         {
-            std::vector<Buffer> buffers;
-            for (int i = 0; i < 8; i++) buffers.push_back(device.createBuffer(Buffer::FlagStorage, 8 << 20));
+            std::array<Buffer, 8> buffers;
+            for (Buffer& buffer : buffers) buffer = device.createBuffer(Buffer::FlagStorage, 8 << 20);
             EXPECT_GE(device.getMemory().bytes, 64u << 20);
             EXPECT_GE(device.getMemory().objects_created, created + 8);
         }
@@ -187,10 +188,10 @@ TEST_P(BufferTest, MemoryComesBack) {
 }
 
 TEST_P(BufferTest, ManyThreadsCreateAndRelease) {
-    std::vector<std::thread> threads;
+    std::array<std::thread, 4> threads;
     std::atomic<int> failures = 0;
-    for (int t = 0; t < 4; t++)
-        threads.emplace_back([&] {
+    for (std::thread& thread : threads)
+        thread = std::thread([&] {
             for (uint32_t i = 1; i <= 50; i++) {
                 const std::vector<uint32_t> values(i, i);
                 const Buffer buffer = device.createBuffer(Buffer::FlagStorage, std::span(values));

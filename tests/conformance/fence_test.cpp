@@ -85,9 +85,9 @@ TEST_F(FenceTest, ManyThreadsWait) {
     const Fence fence = device.createFence();
     Compute list = busy(buffer);
     ASSERT_THAT(device.submit(list, fence), IsOk());
-    std::vector<std::thread> threads;
-    std::vector<Status> results(4);
-    for (Status& result : results) threads.emplace_back([&] { result = fence.wait(); });
+    std::array<std::thread, 4> threads;
+    std::array<Status, 4> results;
+    for (size_t i = 0; i < 4; i++) threads[i] = std::thread([&, i] { results[i] = fence.wait(); });
     for (std::thread& thread : threads) thread.join();
     for (const Status& result : results) EXPECT_THAT(result, IsOk());
 }

@@ -18,13 +18,15 @@ protected:
 
     void roundTrip(const Texture& texture) {
         ASSERT_TRUE(texture) << texture.error().text();
-        for (uint16_t mip = 0; mip < texture.getMipmaps(); mip++)
-            for (uint16_t layer = 0; layer < texture.getLayers(); layer++) {
+        const auto mips = static_cast<uint16_t>(texture.getMipmaps());
+        const auto layers = static_cast<uint16_t>(texture.getLayers());
+        for (uint16_t mip = 0; mip < mips; mip++)
+            for (uint16_t layer = 0; layer < layers; layer++) {
                 const std::vector<uint8_t> data = pattern(texture.getDataSize(mip), mip * 8u + layer);
                 device.setTexture(texture, data.data(), data.size(), {mip, 1, layer, 1});
             }
-        for (uint16_t mip = 0; mip < texture.getMipmaps(); mip++)
-            for (uint16_t layer = 0; layer < texture.getLayers(); layer++)
+        for (uint16_t mip = 0; mip < mips; mip++)
+            for (uint16_t layer = 0; layer < layers; layer++)
                 EXPECT_EQ(readTexture<uint8_t>(texture, {mip, 1, layer, 1}),
                           pattern(texture.getDataSize(mip), mip * 8u + layer))
                     << toString(texture.getFormat()) << ", mip " << mip << ", layer " << layer;
@@ -203,13 +205,14 @@ TEST_P(TextureTest, MipmapsOfCubesAndArraysAndVolumes) {
               {.format = FormatRGBAu8n, .width = 8, .height = 4, .layers = 3, .flags = Texture::FlagMipmaps}),
           device.createTexture3D(FormatRGBAu8n, 8, 8, 8, Texture::FlagMipmaps)}) {
         ASSERT_TRUE(texture);
-        for (uint16_t layer = 0; layer < texture.getLayers(); layer++) {
+        const auto layers = static_cast<uint16_t>(texture.getLayers());
+        for (uint16_t layer = 0; layer < layers; layer++) {
             const std::vector<uint8_t> data(texture.getDataSize(), static_cast<uint8_t>(10 + layer));
             device.setTexture(texture, data.data(), data.size(), {0, 1, layer, 1});
         }
         device.createMipmaps(texture);
         const auto last = static_cast<uint16_t>(texture.getMipmaps() - 1);
-        for (uint16_t layer = 0; layer < texture.getLayers(); layer++)
+        for (uint16_t layer = 0; layer < layers; layer++)
             EXPECT_EQ(readTexture<uint8_t>(texture, {last, 1, layer, 1}),
                       std::vector<uint8_t>(texture.getDataSize(last), static_cast<uint8_t>(10 + layer)));
     }

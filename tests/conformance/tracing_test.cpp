@@ -134,12 +134,14 @@ protected:
         for (const Mesh* mesh : meshes) {
             if (flat) {
                 std::vector<Vector3f> corners;
+                corners.reserve(mesh->indices.size());
                 for (const uint32_t index : mesh->indices) corners.push_back(mesh->positions[index]);
                 tracing.addVertexBuffer(static_cast<uint32_t>(corners.size()), FormatRGBf32, 12,
                                         input(corners.data(), corners.size() * 12));
             } else {
                 // Positions are spread, to see that the stride is minded.
                 std::vector<Vector4f> spread;
+                spread.reserve(mesh->positions.size());
                 for (const Vector3f& position : mesh->positions) spread.push_back(Vector4f(position, 7.0f));
                 tracing.addVertexBuffer(static_cast<uint32_t>(spread.size()), FormatRGBf32, 16,
                                         input(spread.data(), spread.size() * 16));
@@ -463,23 +465,24 @@ TEST_F(TracingTest, CompactionKeepsTheHits) {
 }
 
 TEST_F(TracingTest, BatchesFitTheScratchBuffer) {
-    std::vector<Mesh> meshes;
-    for (uint32_t i = 0; i < 12; i++) meshes.push_back(createSphere(0.3f + 0.05f * static_cast<float>(i), 1 + i % 3));
-    std::vector<Tracing> structures;
+    std::array<Mesh, 12> meshes;
+    std::array<Tracing, 12> structures;
     std::vector<Tracing::Instance> instances;
     std::vector<ReferenceInstance> expected;
     uint64_t largest = 0;
-    for (const Mesh& mesh : meshes) structures.push_back(bottom({&mesh}));
-    for (size_t i = 0; i < meshes.size(); i++) {
+    for (uint32_t i = 0; i < 12; i++) {
+        meshes[i] = createSphere(0.3f + 0.05f * static_cast<float>(i), 1 + i % 3);
+        structures[i] = bottom({&meshes[i]});
         largest = std::max(largest, structures[i].getBuildSize());
-        const Matrix4x4f place = translate({static_cast<float>(i % 4) - 1.5f, static_cast<float>(i / 4) - 1.0f, 0});
+        const uint32_t column = i % 4, row = i / 4;
+        const Matrix4x4f place = translate({static_cast<float>(column) - 1.5f, static_cast<float>(row) - 1.0f, 0});
         instances.push_back(instance(structures[i], place));
         expected.push_back({{&meshes[i]}, place});
     }
     const Tracing scene = device.createTracing(std::span<const Tracing::Instance>(instances));
     largest = std::max(largest, scene.getBuildSize());
     const Buffer scratch = device.createBuffer(Buffer::FlagScratch, largest, "scratch");
-    std::vector<Tracing> all = structures;
+    std::vector<Tracing> all(structures.begin(), structures.end());
     all.push_back(scene);
     EXPECT_THAT(device.buildTracings(std::span<const Tracing>(all), scratch), IsOk());
     const std::vector<Ray> cast = rays(300);

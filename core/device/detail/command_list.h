@@ -364,8 +364,8 @@ using UnsetBytes = std::vector<std::byte, UnsetAllocator<std::byte>>;
 
 /// A closed list is constant until it is recycled. Buffers keep their capacity, so that a warm frame allocates nothing.
 struct CommandList {
-    std::vector<std::byte> bytes;     ///< command payloads that commands point into: bindings, names
-    std::vector<std::byte> commands;  ///< commands one after the other, each a multiple of 8 bytes
+    std::vector<std::byte> bytes;  ///< command payloads that commands point into: bindings, names
+    UnsetBytes commands;           ///< commands one after the other, each a multiple of 8 bytes
     std::vector<Access> accesses;
     std::vector<Object*> resources;  ///< one reference held for each
     UnsetBytes inline_data;          ///< uploaded at submit, to an address aligned to 256 bytes

@@ -296,12 +296,23 @@ void RecorderCore::accessBound(const ShaderResource& resource, SlotKind kind, co
 bool RecorderCore::flushBindings(const char* what, Where where) {
     if (!bindings_dirty_ && !uniforms_dirty_) return true;
     const BindingLayout& layout = program_->layout;
+    // Written in place, once there is room for all: growing moves what came before.
     if (bindings_dirty_) {
-        scratch_bound_.assign(program_->element_count, {});
+        bindings_.bound = room(program_->element_count * sizeof(BoundResource), alignof(BoundResource));
+        bindings_.bound_count = program_->element_count;
         first_shared_ = static_cast<uint32_t>(list_.accesses.size());
     }
-    scratch_offsets_.assign(program_->uniform_elements, 0);
+    bindings_.uniform_offsets = room(program_->uniform_elements * sizeof(uint32_t), alignof(uint32_t));
+    bindings_.uniform_count = program_->uniform_elements;
+    BoundResource* elements = nullptr;
+    uint32_t* offsets = nullptr;
+    if (bindings_.bound != none) elements = reinterpret_cast<BoundResource*>(list_.bytes.data() + bindings_.bound);
+    if (bindings_.uniform_offsets != none)
+        offsets = reinterpret_cast<uint32_t*>(list_.bytes.data() + bindings_.uniform_offsets);
+    if (bindings_dirty_)
+        for (uint32_t i = 0; i < program_->element_count; i++) elements[i].second = none;
 
+    Bound unset;
     for (size_t k = 0; k < layout.slots.size(); k++) {
         const auto kind = static_cast<SlotKind>(k);
         if (!bindings_dirty_ && kind != SlotKind::Uniform) continue;
@@ -312,14 +323,13 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
             auto& slots = bound_[k];
             if (slot >= slots.size()) slots.resize(layout.slots[k].size());
             for (uint32_t e = 0; e < resource.count; e++) {
-                Bound unset;
                 Bound& bound = resource.count == 1               ? slots[slot]
                                : e < slots[slot].elements.size() ? slots[slot].elements[e]
                                                                  : unset;
                 if (bindings_dirty_ && !checkBound(resource, kind, slot, bound, what, where)) return false;
-                if (kind == SlotKind::Uniform) scratch_offsets_[uniform++] = static_cast<uint32_t>(bound.value.offset);
+                if (kind == SlotKind::Uniform) offsets[uniform++] = static_cast<uint32_t>(bound.value.offset);
                 if (!bindings_dirty_) continue;
-                BoundResource& element = scratch_bound_[program_->first_element[index] + e];
+                BoundResource& element = elements[program_->first_element[index] + e];
                 if (kind == SlotKind::Sampler && resource.combined) {
                     element.second = bound.value.resource;
                 } else {
@@ -355,15 +365,7 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
                     return false;
                 }
         }
-        bindings_.bound = scratch_bound_.empty()
-                              ? none
-                              : append(scratch_bound_.data(), scratch_bound_.size() * sizeof(BoundResource));
-        bindings_.bound_count = static_cast<uint32_t>(scratch_bound_.size());
     }
-    bindings_.uniform_offsets = scratch_offsets_.empty()
-                                    ? none
-                                    : append(scratch_offsets_.data(), scratch_offsets_.size() * sizeof(uint32_t), 4);
-    bindings_.uniform_count = static_cast<uint32_t>(scratch_offsets_.size());
     bindings_dirty_ = uniforms_dirty_ = false;
     return true;
 }

@@ -159,6 +159,13 @@ uint32_t RecorderCore::use(Object& object) {
     }
 }
 
+uint32_t RecorderCore::room(size_t size, size_t alignment) {
+    if (size == 0) return none;
+    const size_t offset = (list_.bytes.size() + alignment - 1) / alignment * alignment;
+    list_.bytes.resize(offset + size);
+    return static_cast<uint32_t>(offset);
+}
+
 uint32_t RecorderCore::append(const void* data, size_t size, size_t alignment) {
     const size_t offset = (list_.bytes.size() + alignment - 1) / alignment * alignment;
     list_.bytes.resize(offset + size);

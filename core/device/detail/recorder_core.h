@@ -141,6 +141,8 @@ private:
 
     /// Index of an object in the list's resources; the list keeps it alive.
     uint32_t use(Object& object);
+    /// Zeroed bytes at the end of CommandList::bytes; the offset, or none for no bytes.
+    uint32_t room(size_t size, size_t alignment);
     /// Appends to CommandList::bytes; the offset.
     uint32_t append(const void* data, size_t size, size_t alignment = 8);
     uint32_t appendInline(const void* data, uint64_t size, uint64_t alignment, uint64_t padded = 0);
@@ -200,8 +202,6 @@ private:
     Bindings bindings_;
     uint32_t first_shared_ = 0;
     uint32_t shared_count_ = 0;
-    std::vector<BoundResource> scratch_bound_;
-    std::vector<uint32_t> scratch_offsets_;
     std::array<std::byte, 256> push_data_ = {};
     uint32_t push_size_ = 0;
 

@@ -218,7 +218,8 @@ bool RecorderCore::flushDraw(bool indexed, DrawState& state, Where where) {
         for (uint32_t i = 0; i < shared_count_; i++) {
             const Access& shared = list_.accesses[first_shared_ + i];
             if (shared.layout == Layout::None) continue;
-            const Object* object = list_.resources[shared.resource];
+            const auto* object = static_cast<const TextureObject*>(list_.resources[shared.resource]);
+            if (!(object->desc.flags & Texture::FlagTarget)) continue;
             const auto attached = [&](const TargetObject::Attachment& attachment) {
                 return (attachment.texture.get() == object && attachment.slice.mip >= shared.slice.mip &&
                         attachment.slice.mip < shared.slice.mip + shared.slice.mips &&

@@ -14,6 +14,8 @@ constexpr StageMask transition_slot = 1u << stage_count;
 constexpr StageMask all_slots = (1u << (stage_count + 1)) - 1;
 /// Signals of a queue that are kept; a wait for an older one orders nothing here.
 constexpr size_t signal_limit = 4096;
+/// Writes to different parts of a buffer that are remembered.
+constexpr size_t write_limit = 64;
 
 template <class Visitor>
 void forEachStage(StageMask stages, Visitor&& visit) {
@@ -180,6 +182,7 @@ struct HazardChecker::Now {
     std::vector<const char*> regions = {};
     uint32_t place = 0;
     Site site = {};
+    const CommandHeader* header = nullptr;
 
     const BeginTargetCommand* target = nullptr;
     std::vector<Access> attachments = {};
@@ -268,6 +271,7 @@ void HazardChecker::judgeList(Now& now, const ResolvedList& list) {
 void HazardChecker::judgeCommand(Now& now, const CommandHeader& header) {
     const CommandList& list = *now.list;
     now.queue.position++;
+    now.header = &header;
     switch (header.type) {
         case CommandType::BeginTarget:
             now.target = reinterpret_cast<const BeginTargetCommand*>(&header);
@@ -413,10 +417,29 @@ void HazardChecker::access(Now& now, std::span<const Access> accesses) {
             resource->forEachPart(one.slice, [&](History& history, const Slice&) { record(now, one, history); });
 }
 
+bool HazardChecker::isVisible(const Now& now, const Use& write, const Use& use) const {
+    if ((use.target != 0 && write.target == use.target) || !write.range.meets(use.range)) return true;
+    if (write.site.transition && write.site.queue == now.kind && (write.stages & use.stages)) return true;
+    bool visible = false;
+    forEachStage(use.stages, [&](size_t stage) {
+        const Scope& scope = now.queue.stages[stage];
+        const Clock& seen = write.site.transition ? scope.settled : scope.visible;
+        visible |= seen.reaches(write.site.queue, write.stages, write.position);
+    });
+    return visible;
+}
+
+bool HazardChecker::isOrdered(const Now& now, const Use& read, const Use& use) const {
+    if ((use.target != 0 && read.target == use.target) || !read.range.meets(use.range)) return true;
+    bool ordered = false;
+    forEachStage(use.stages, [&](size_t stage) {
+        ordered |= now.queue.stages[stage].ordered.reaches(read.site.queue, read.stages, read.position);
+    });
+    return ordered;
+}
+
 void HazardChecker::check(Now& now, const Access& access, const History& history, const Slice& part) {
     const Use use = makeUse(now, access);
-    const Scope& scope = now.queue.stages[static_cast<size_t>(access.stage)];
-
     if (access.layout != history.layout) {
         report(now, "hazard.layout", access.resource,
                fmt::format("{} expects mip level {}, layer {} in layout {}, not in {}", describe(now.site), part.mip,
@@ -428,18 +451,14 @@ void HazardChecker::check(Now& now, const Access& access, const History& history
                            part.layer, describe(history.discard)));
     }
     for (const Use& write : history.writes) {
-        if (use.target != 0 && write.target == use.target) continue;
-        const bool direct = write.site.transition && write.site.queue == now.kind && (write.stages & use.stages);
-        const Clock& seen = write.site.transition ? scope.settled : scope.visible;
-        if (direct || seen.reaches(write.site.queue, write.stages, write.position)) continue;
+        if (isVisible(now, write, use)) continue;
         reportConflict(now, access.flags & AccessRead ? "hazard.read_after_write" : "hazard.write_after_write",
                        access.resource, part, write, use);
         break;
     }
     if (!(access.flags & AccessWrite)) return;
     for (const Use& read : history.reads) {
-        if (use.target != 0 && read.target == use.target) continue;
-        if (scope.ordered.reaches(read.site.queue, read.stages, read.position)) continue;
+        if (isOrdered(now, read, use)) continue;
         reportConflict(now, "hazard.write_after_read", access.resource, part, read, use);
         break;
     }
@@ -448,11 +467,14 @@ void HazardChecker::check(Now& now, const Access& access, const History& history
 void HazardChecker::record(Now& now, const Access& access, History& history) {
     const Use use = makeUse(now, access);
     if (access.flags & AccessWrite) {
-        const auto older = [&](const Use& earlier) {
-            return earlier.site.queue != now.kind || earlier.position != use.position;
+        // Whatever comes after this write comes after what it covers.
+        const auto covered = [&](const Use& earlier) {
+            return (earlier.site.queue != now.kind || earlier.position != use.position) &&
+                   use.range.covers(earlier.range);
         };
-        std::erase_if(history.writes, older);
-        std::erase_if(history.reads, older);
+        std::erase_if(history.writes, covered);
+        std::erase_if(history.reads, covered);
+        if (history.writes.size() >= write_limit) history.writes.erase(history.writes.begin());
         history.writes.push_back(use);
         history.written = true;
         if (access.flags & AccessDiscard) history.discarded = false;
@@ -461,15 +483,23 @@ void HazardChecker::record(Now& now, const Access& access, History& history) {
     // When the CPU reads is not the queues' affair: the program waits before, and submits what overwrites it after.
     if (access.stage == Stage::Host) return;
     // A stage's later read stands for its earlier ones: whatever is ordered after it is ordered after them.
-    std::erase_if(history.reads, [&](const Use& read) {
+    const auto same = std::ranges::find_if(history.reads, [&](const Use& read) {
         return read.site.queue == now.kind && read.stages == use.stages;
     });
-    history.reads.push_back(use);
+    if (same == history.reads.end()) {
+        history.reads.push_back(use);
+        return;
+    }
+    const ByteRange both{std::min(same->range.begin, use.range.begin), std::max(same->range.end, use.range.end)};
+    *same = use;
+    same->range = both;
 }
 
 HazardChecker::Use HazardChecker::makeUse(const Now& now, const Access& access) const {
+    const bool is_free = now.site.untracked && access.layout == Layout::None;
     return {.stages = bit(access.stage), .position = now.queue.position,
-            .target = isTargetStage(access.stage) ? now.target_id : 0, .site = now.site};
+            .target = isTargetStage(access.stage) ? now.target_id : 0,
+            .range = is_free ? touchedRange(*now.list, *now.header, access.resource) : ByteRange{}, .site = now.site};
 }
 
 void HazardChecker::accessAttachments(Now& now, uint8_t flags) {

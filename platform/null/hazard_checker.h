@@ -11,9 +11,12 @@
 //   stage that reads or writes next. A transition is a memory barrier for its own slice only.
 // - A transition reads and writes its slice, between its source and its destination stages.
 // - Attachments of one target need no order among themselves until the target is split.
+// - Untracked commands do not conflict over parts of a buffer that are apart.
 //
 // For each stage of each queue clocks say how far every stage of every queue is ordered before it, and how far what they
 // wrote is available and visible to it. An access is compared with the last write and with the reads since then.
+
+#include <platform/null/hazard_range.h>
 
 #include <glint/base/error.h>
 #include <glint/device/detail/backend.h>
@@ -109,6 +112,7 @@ private:
         detail::StageMask stages = 0;  ///< one stage, or the destination of a transition
         uint64_t position = 0;
         uint64_t target = 0;           ///< the target it is an attachment of, 0 for none
+        ByteRange range;               ///< of an untracked command
         Site site;
     };
     /// Of a buffer, of a structure, or of one subresource of a texture.
@@ -117,7 +121,7 @@ private:
         bool written = false;
         bool discarded = false;        ///< by the last transition from Undefined
         Site discard;
-        std::vector<Use> writes;       ///< of the last command that wrote
+        std::vector<Use> writes;       ///< of the last command that wrote, and of those beside it
         std::vector<Use> reads;        ///< since then, the last one of each stage and queue
     };
     struct Resource {
@@ -142,6 +146,9 @@ private:
     void judgeBarrier(Now& now, const detail::Barrier& barrier, std::span<const detail::ImageBarrier> images);
     void transition(Now& now, const detail::ImageBarrier& image, const Scope& source);
     void access(Now& now, std::span<const detail::Access> accesses);
+    /// What comes before a write or a read of a stage.
+    bool isVisible(const Now& now, const Use& write, const Use& use) const;
+    bool isOrdered(const Now& now, const Use& read, const Use& use) const;
     void check(Now& now, const detail::Access& access, const History& history, const Slice& part);
     void record(Now& now, const detail::Access& access, History& history);
     Use makeUse(const Now& now, const detail::Access& access) const;

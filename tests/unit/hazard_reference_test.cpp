@@ -273,7 +273,7 @@ private:
 
 TEST(HazardReference, BothJudgesAgreeOnRandomStreams) {
     size_t clean = 0, late = 0;
-    constexpr uint64_t seeds = 10000;
+    constexpr uint64_t seeds = 5000;
     for (uint64_t seed = 0; seed < seeds; seed++) {
         const RandomStream::Verdict verdict = RandomStream(seed).run();
         ASSERT_EQ(verdict.fast, verdict.slow) << "seed " << seed;

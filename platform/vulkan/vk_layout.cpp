@@ -154,40 +154,35 @@ Status LayoutCache::fill(SetLayout& set) {
     return {};
 }
 
-Expected<VkDescriptorSet> LayoutCache::acquire(SetLayout& layout) {
-    if (layout.free.empty()) {
-        const uint32_t count = layout.next_count;
-        std::vector<VkDescriptorPoolSize> sizes;
-        for (const SetLayout::Binding& binding : layout.bindings)
-            sizes.push_back({binding.type, binding.count * count});
-        VkDescriptorPoolCreateInfo pool_info = {VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
-        pool_info.maxSets = count;
-        pool_info.poolSizeCount = static_cast<uint32_t>(sizes.size());
-        pool_info.pPoolSizes = sizes.data();
-        VkDescriptorPool pool = VK_NULL_HANDLE;
-        VkResult result = device_.vk.CreateDescriptorPool(device_.handle, &pool_info, nullptr, &pool);
-        if (result != VK_SUCCESS) return unexpected(resultError("vkCreateDescriptorPool", result));
-        const std::vector<VkDescriptorSetLayout> layouts(count, layout.handle);
-        VkDescriptorSetAllocateInfo info = {VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
-        info.descriptorPool = pool;
-        info.descriptorSetCount = count;
-        info.pSetLayouts = layouts.data();
-        layout.free.resize(count);
-        result = device_.vk.AllocateDescriptorSets(device_.handle, &info, layout.free.data());
-        if (result != VK_SUCCESS) {
-            layout.free.clear();
-            device_.vk.DestroyDescriptorPool(device_.handle, pool, nullptr);
-            return unexpected(resultError("vkAllocateDescriptorSets", result));
-        }
-        layout.pools.push_back(pool);
-        layout.next_count = std::min(count * 2, 1024u);
-        layout.count += count;
-        layout.free.reserve(layout.count);  // all may be free at once one day; recycling allocates nothing
-        device_.memory.objects_created += 1 + count;
+Status LayoutCache::refill(SetLayout& layout) {
+    const uint32_t count = layout.next_count;
+    std::vector<VkDescriptorPoolSize> sizes;
+    for (const SetLayout::Binding& binding : layout.bindings) sizes.push_back({binding.type, binding.count * count});
+    VkDescriptorPoolCreateInfo pool_info = {VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
+    pool_info.maxSets = count;
+    pool_info.poolSizeCount = static_cast<uint32_t>(sizes.size());
+    pool_info.pPoolSizes = sizes.data();
+    VkDescriptorPool pool = VK_NULL_HANDLE;
+    VkResult result = device_.vk.CreateDescriptorPool(device_.handle, &pool_info, nullptr, &pool);
+    if (result != VK_SUCCESS) return resultError("vkCreateDescriptorPool", result);
+    const std::vector<VkDescriptorSetLayout> layouts(count, layout.handle);
+    std::vector<VkDescriptorSet> sets(count);
+    VkDescriptorSetAllocateInfo info = {VK_STRUCTURE_TYPE_DESCRIPTOR_SET_ALLOCATE_INFO};
+    info.descriptorPool = pool;
+    info.descriptorSetCount = count;
+    info.pSetLayouts = layouts.data();
+    result = device_.vk.AllocateDescriptorSets(device_.handle, &info, sets.data());
+    if (result != VK_SUCCESS) {
+        device_.vk.DestroyDescriptorPool(device_.handle, pool, nullptr);
+        return resultError("vkAllocateDescriptorSets", result);
     }
-    const VkDescriptorSet set = layout.free.back();
-    layout.free.pop_back();
-    return set;
+    layout.pools.push_back(pool);
+    layout.next_count = std::min(count * 2, 1024u);
+    layout.count += count;
+    layout.free.reserve(layout.count);  // all may be free at once one day; recycling allocates nothing
+    layout.free.insert(layout.free.end(), sets.begin(), sets.end());
+    device_.memory.objects_created += 1 + count;
+    return {};
 }
 
 }  // namespace glint::vulkan

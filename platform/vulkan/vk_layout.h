@@ -81,8 +81,8 @@ public:
     /// From any thread. Errors: "layout.table" (an array of unknown length), "layout.sets", "vulkan.result", ...
     Expected<PipelineLayout*> get(const BindingLayout& layout);
 
-    /// A set that no submission uses. Under the submit lock.
-    Expected<VkDescriptorSet> acquire(SetLayout& layout);
+    /// Makes more free sets. Under the submit lock.
+    Status refill(SetLayout& layout);
 
 private:
     Expected<SetLayout*> getSet(std::vector<SetLayout::Binding> bindings);

@@ -95,12 +95,15 @@ bool Player::bind(BindPoint& point, const PipelineLayout& layout, const Bindings
 
 VkDescriptorSet Player::writeSet(const PipelineLayout& layout, const PipelineLayout::Set& set,
                                  const BoundResource* elements, const uint32_t* uniforms) {
-    Expected<VkDescriptorSet> acquired = device_.layouts.acquire(*set.layout);
-    if (!acquired) {
-        fail(acquired.error());
-        return VK_NULL_HANDLE;
+    if (set.layout->free.empty()) {
+        if (Status status = device_.layouts.refill(*set.layout); !status) {
+            fail(status.error());
+            return VK_NULL_HANDLE;
+        }
     }
-    frame_->sets.emplace_back(set.layout, *acquired);
+    const VkDescriptorSet written = set.layout->free.back();
+    set.layout->free.pop_back();
+    frame_->sets.emplace_back(set.layout, written);
     if (descriptors_.size() < set.element_count) descriptors_.resize(set.element_count);
     uint32_t uniform = set.first_uniform;
     for (uint32_t i = 0; i < set.element_count; i++) {
@@ -109,8 +112,8 @@ VkDescriptorSet Player::writeSet(const PipelineLayout& layout, const PipelineLay
         if (element.uniform && !layout.dynamic) offset = uniforms[uniform++];
         if (!writeElement(element, elements[set.first_element + i], offset, descriptors_[i])) return VK_NULL_HANDLE;
     }
-    vk_.UpdateDescriptorSetWithTemplate(device_.handle, *acquired, set.layout->update, descriptors_.data());
-    return *acquired;
+    vk_.UpdateDescriptorSetWithTemplate(device_.handle, written, set.layout->update, descriptors_.data());
+    return written;
 }
 
 bool Player::writeElement(const LayoutElement& element, const BoundResource& bound, uint64_t uniform_offset,

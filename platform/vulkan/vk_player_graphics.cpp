@@ -6,6 +6,7 @@
 #include "platform/vulkan/vk_texture.h"
 
 #include <glint/device/detail/object.h>
+#include <glint/device/detail/texture_layout.h>
 
 #include <algorithm>
 
@@ -24,15 +25,7 @@ VkClearValue clearValue(const Attachment& attachment, Format format, bool is_dep
         return value;
     }
     const FormatType type = formatInfo(format).type;
-    for (size_t i = 0; i < 4; i++) {
-        if (type == FormatType::Uint) {
-            value.color.uint32[i] = static_cast<uint32_t>(std::max(attachment.clear[i], 0.0f));
-        } else if (type == FormatType::Int) {
-            value.color.int32[i] = static_cast<int32_t>(attachment.clear[i]);
-        } else {
-            value.color.float32[i] = attachment.clear[i];
-        }
-    }
+    for (size_t i = 0; i < 4; i++) value.color.uint32[i] = clearBits(type, attachment.clear[i]);
     return value;
 }
 

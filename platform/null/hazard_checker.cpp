@@ -40,8 +40,8 @@ const char* queueName(Queue queue) {
     return "unknown";
 }
 
-// Vulkan, "Pipeline Stages": the order of the stages of one command. Depth tests come both before and after the fragment
-// shader, so it holds neither all of them before itself nor all after.
+// Vulkan, "Pipeline Stages": the order of the stages of one command. Depth tests come both before and after the
+// fragment shader, so it holds neither all of them before itself nor all after.
 constexpr StageMask front_end = bit(Stage::Indirect) | bit(Stage::VertexInput) | bit(Stage::VertexShader);
 
 constexpr StageMask earlierStages(Stage stage) {
@@ -256,8 +256,13 @@ void HazardChecker::judgeList(Now& now, const ResolvedList& list) {
         }
     };
     const auto setSite = [&](uint32_t index, CommandType type, bool untracked) {
-        now.site = {.queue = now.kind, .value = now.value, .command = index, .place = now.place, .type = type,
-                    .transition = false, .untracked = untracked};
+        now.site = {.queue = now.kind,
+                    .value = now.value,
+                    .command = index,
+                    .place = now.place,
+                    .type = type,
+                    .transition = false,
+                    .untracked = untracked};
     };
     forEachCommand(*list.list, [&](uint32_t index, const CommandHeader& header) {
         setSite(index, header.type, header.untracked);
@@ -296,9 +301,9 @@ void HazardChecker::judgeCommand(Now& now, const CommandHeader& header) {
                 now.accesses.push_back(one);
                 continue;
             }
-            report(now, "hazard.feedback", one.resource,
-                   fmt::format("{} accesses an attachment of its target at {}", describe(now.site),
-                               toString(one.stage)));
+            report(
+                now, "hazard.feedback", one.resource,
+                fmt::format("{} accesses an attachment of its target at {}", describe(now.site), toString(one.stage)));
         }
     };
     collect(header.first_access, header.access_count);
@@ -377,13 +382,14 @@ void HazardChecker::transition(Now& now, const ImageBarrier& image, const Scope&
     Resource* resource = find(now, image.resource);
     if (!resource || !resource->texture) return;
     Use use{.stages = static_cast<StageMask>((image.destination & all_slots) | transition_slot),
-            .position = now.queue.position, .site = now.site};
+            .position = now.queue.position,
+            .site = now.site};
     use.site.transition = true;
     resource->forEachPart(image.slice, [&](History& history, const Slice& part) {
         if (image.from != Layout::Undefined && image.from != history.layout) {
             report(now, "hazard.layout", image.resource,
-                   fmt::format("{} of mip level {}, layer {} is from layout {}, not from {}", describe(use.site), part.mip,
-                               part.layer, toString(image.from), toString(history.layout)));
+                   fmt::format("{} of mip level {}, layer {} is from layout {}, not from {}", describe(use.site),
+                               part.mip, part.layer, toString(image.from), toString(history.layout)));
         }
         for (const Use& write : history.writes) {
             const Clock& seen = write.site.transition ? source.settled : source.visible;
@@ -411,7 +417,8 @@ void HazardChecker::transition(Now& now, const ImageBarrier& image, const Scope&
 void HazardChecker::access(Now& now, std::span<const Access> accesses) {
     for (const Access& one : accesses)
         if (Resource* resource = find(now, one.resource))
-            resource->forEachPart(one.slice, [&](History& history, const Slice& part) { check(now, one, history, part); });
+            resource->forEachPart(one.slice,
+                                  [&](History& history, const Slice& part) { check(now, one, history, part); });
     for (const Access& one : accesses)
         if (Resource* resource = find(now, one.resource))
             resource->forEachPart(one.slice, [&](History& history, const Slice&) { record(now, one, history); });
@@ -483,9 +490,8 @@ void HazardChecker::record(Now& now, const Access& access, History& history) {
     // When the CPU reads is not the queues' affair: the program waits before, and submits what overwrites it after.
     if (access.stage == Stage::Host) return;
     // A stage's later read stands for its earlier ones: whatever is ordered after it is ordered after them.
-    const auto same = std::ranges::find_if(history.reads, [&](const Use& read) {
-        return read.site.queue == now.kind && read.stages == use.stages;
-    });
+    const auto same = std::ranges::find_if(
+        history.reads, [&](const Use& read) { return read.site.queue == now.kind && read.stages == use.stages; });
     if (same == history.reads.end()) {
         history.reads.push_back(use);
         return;
@@ -497,9 +503,11 @@ void HazardChecker::record(Now& now, const Access& access, History& history) {
 
 HazardChecker::Use HazardChecker::makeUse(const Now& now, const Access& access) const {
     const bool is_free = now.site.untracked && access.layout == Layout::None;
-    return {.stages = bit(access.stage), .position = now.queue.position,
+    return {.stages = bit(access.stage),
+            .position = now.queue.position,
             .target = isTargetStage(access.stage) ? now.target_id : 0,
-            .range = is_free ? touchedRange(*now.list, *now.header, access.resource) : ByteRange{}, .site = now.site};
+            .range = is_free ? touchedRange(*now.list, *now.header, access.resource) : ByteRange{},
+            .site = now.site};
 }
 
 void HazardChecker::accessAttachments(Now& now, uint8_t flags) {
@@ -521,8 +529,8 @@ void HazardChecker::dropContents(Now& now, const Attachment& attachment) {
 bool HazardChecker::isAttachment(Now& now, const Access& access) {
     const Resource* resource = find(now, access.resource);
     return resource && resource->texture && std::ranges::any_of(now.attachments, [&](const Access& attachment) {
-        return find(now, attachment.resource) == resource && overlap(attachment.slice, access.slice);
-    });
+               return find(now, attachment.resource) == resource && overlap(attachment.slice, access.slice);
+           });
 }
 
 HazardChecker::Resource* HazardChecker::find(Now& now, uint32_t index) {

@@ -3,18 +3,19 @@
 // Judges streams of submissions: are any two conflicting accesses ordered, and is each write seen by what reads it? It
 // shares no code and no idea with the tracker that places the barriers, but follows Vulkan's rules:
 //
-// - Commands of a queue are not ordered by their order alone. A barrier orders what its source stages did before it, and
+// - Commands of a queue are not ordered by their order alone. A barrier orders what its source stages did before it,
+// and
 //   what those stages had been ordered after, before its destination stages (a chain); so does a transition. With a
-//   source stage come the logically earlier ones of its pipeline, with a destination stage the later ones: for order, not
-//   for memory. A wait for another queue's time line orders everything that was submitted there before.
+//   source stage come the logically earlier ones of its pipeline, with a destination stage the later ones: for order,
+//   not for memory. A wait for another queue's time line orders everything that was submitted there before.
 // - A write is seen where a memory barrier, or a wait, lies on such a chain: after the write's own stage and into the
 //   stage that reads or writes next. A transition is a memory barrier for its own slice only.
 // - A transition reads and writes its slice, between its source and its destination stages.
 // - Attachments of one target need no order among themselves until the target is split.
 // - Untracked commands do not conflict over parts of a buffer that are apart.
 //
-// For each stage of each queue clocks say how far every stage of every queue is ordered before it, and how far what they
-// wrote is available and visible to it. An access is compared with the last write and with the reads since then.
+// For each stage of each queue clocks say how far every stage of every queue is ordered before it, and how far what
+// they wrote is available and visible to it. An access is compared with the last write and with the reads since then.
 
 #include <platform/null/hazard_range.h>
 
@@ -36,8 +37,8 @@ namespace glint::null {
 
 /// What the checker has to know of an object that a list names.
 struct HazardResource {
-    uint64_t id = 0;      ///< of the memory, never used again; 0 for what is no memory: samplers, kernels
-    uint32_t mips = 0;    ///< 0 for what is no texture
+    uint64_t id = 0;    ///< of the memory, never used again; 0 for what is no memory: samplers, kernels
+    uint32_t mips = 0;  ///< 0 for what is no texture
     uint32_t layers = 0;
 };
 
@@ -95,40 +96,40 @@ private:
         std::array<Scope, slots> stages;
         Clock waited;
         std::deque<Signal> signals;
-        uint64_t forgotten = 0;        ///< signals up to this value are no longer kept
+        uint64_t forgotten = 0;  ///< signals up to this value are no longer kept
     };
 
     /// The command of an access, for messages.
     struct Site {
         Queue queue = Queue::Main;
-        uint64_t value = 0;          ///< of the submission
-        uint32_t command = 0;        ///< index in its list
-        uint32_t place = 0;          ///< index into places_
+        uint64_t value = 0;    ///< of the submission
+        uint32_t command = 0;  ///< index in its list
+        uint32_t place = 0;    ///< index into places_
         detail::CommandType type = detail::CommandType::Barrier;
-        bool transition = false;     ///< the transition before the command
+        bool transition = false;  ///< the transition before the command
         bool untracked = false;
     };
     struct Use {
         detail::StageMask stages = 0;  ///< one stage, or the destination of a transition
         uint64_t position = 0;
-        uint64_t target = 0;           ///< the target it is an attachment of, 0 for none
-        ByteRange range;               ///< of an untracked command
+        uint64_t target = 0;  ///< the target it is an attachment of, 0 for none
+        ByteRange range;      ///< of an untracked command
         Site site;
     };
     /// Of a buffer, of a structure, or of one subresource of a texture.
     struct History {
         detail::Layout layout = detail::Layout::Undefined;
         bool written = false;
-        bool discarded = false;        ///< by the last transition from Undefined
+        bool discarded = false;  ///< by the last transition from Undefined
         Site discard;
-        std::vector<Use> writes;       ///< of the last command that wrote, and of those beside it
-        std::vector<Use> reads;        ///< since then, the last one of each stage and queue
+        std::vector<Use> writes;  ///< of the last command that wrote, and of those beside it
+        std::vector<Use> reads;   ///< since then, the last one of each stage and queue
     };
     struct Resource {
         uint32_t mips = 1;
         uint32_t layers = 1;
         bool texture = false;
-        std::vector<History> parts;    ///< layer-major
+        std::vector<History> parts;  ///< layer-major
 
         /// Calls visit(history, part) for each subresource of the slice; `part` is empty for what is no texture.
         template <class Visitor>

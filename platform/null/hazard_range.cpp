@@ -16,8 +16,8 @@ const T* as(const CommandHeader& header) {
 
 ByteRange join(const ByteRange& a, const ByteRange& b) { return {std::min(a.begin, b.begin), std::max(a.end, b.end)}; }
 
-/// Storage blocks and texel buffers. What else reaches the buffer (by address, or as uniform block, whose offset is kept
-/// elsewhere) makes the range unknown.
+/// Storage blocks and texel buffers. What else reaches the buffer (by address, or as uniform block, whose offset is
+/// kept elsewhere) makes the range unknown.
 ByteRange boundRange(const CommandList& list, const CommandHeader& header, const Bindings& bindings,
                      uint32_t resource) {
     if (bindings.bound == none) return {};

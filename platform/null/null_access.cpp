@@ -192,12 +192,14 @@ private:
         const auto any = [&](uint32_t first, uint32_t count) {
             return std::ranges::any_of(std::span(list_.accesses).subspan(first, count), declares);
         };
-        if (any(header_->first_access, header_->access_count) || any(header_->first_shared, header_->shared_count)) return;
+        if (any(header_->first_access, header_->access_count) || any(header_->first_shared, header_->shared_count))
+            return;
         std::string name = resource < list_.resources.size() ? list_.resources[resource]->label() : what;
         if (!what.empty() && name != what) name += " (" + what + ")";
         control_.report(makeError(ErrorCode::Internal, "null.undeclared",
                                   "{} {} of '{}' {} {} at {} without an access that says so", toString(header_->type),
-                                  index_, list_.label, flags & AccessWrite ? "writes" : "reads", name, toString(stage)));
+                                  index_, list_.label, flags & AccessWrite ? "writes" : "reads", name,
+                                  toString(stage)));
     }
 
     const CommandList& list_;

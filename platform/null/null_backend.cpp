@@ -105,7 +105,8 @@ public:
             const bool there = features_.has(FeatureTextureBC) && type != Texture::Type3D;
             return there ? sampling | Texture::FlagMipmaps : 0;
         }
-        if (info.depth) return type == Texture::Type3D ? 0 : sampling | Texture::FlagTarget | Texture::FlagMipmaps | multisample;
+        if (info.depth)
+            return type == Texture::Type3D ? 0 : sampling | Texture::FlagTarget | Texture::FlagMipmaps | multisample;
         if (format == FormatRGBEu9e5) return sampling | Texture::FlagMipmaps;
         uint32_t support = sampling | Texture::FlagTarget | Texture::FlagMipmaps;
         if (!info.srgb) support |= Texture::FlagSurface;
@@ -176,7 +177,8 @@ public:
     }
     Expected<std::array<uint64_t, 7>> queryResult(NativeQuery& query) override {
         const auto& null_query = static_cast<NullQuery&>(query);
-        if (!null_query.ended) return unexpected(makeError(ErrorCode::Internal, "null.query", "the query was not ended"));
+        if (!null_query.ended)
+            return unexpected(makeError(ErrorCode::Internal, "null.query", "the query was not ended"));
         return null_query.result;
     }
 
@@ -244,8 +246,6 @@ Expected<std::unique_ptr<Backend>> createNullBackend(const BackendDesc& desc) {
     return std::make_unique<NullBackend>(makeControl(), desc);
 }
 
-Expected<std::vector<DeviceInfo>> nullAdapters() {
-    return std::vector<DeviceInfo>{describeAdapter(currentSettings())};
-}
+Expected<std::vector<DeviceInfo>> nullAdapters() { return std::vector<DeviceInfo>{describeAdapter(currentSettings())}; }
 
 }  // namespace glint::null

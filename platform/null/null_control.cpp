@@ -144,7 +144,8 @@ void NullControl::destroy(uint64_t id, uint64_t bytes, const std::string& name,
                                       last_use[q], q));
         }
         if (!open_) {
-            found.push_back(makeError(ErrorCode::Internal, "null.outlived", "'{}' was deleted after its back end", name));
+            found.push_back(
+                makeError(ErrorCode::Internal, "null.outlived", "'{}' was deleted after its back end", name));
         }
     }
     tell(std::move(found));
@@ -182,7 +183,8 @@ Status NullControl::beginSubmit(const Submission& submission) {
     if (submission.value <= lines_[at(submission.queue)].submitted)
         return refuse("a submission with value", submission.queue, submission.value);
     for (const TimelinePoint& point : submission.waits)
-        if (point.value > lines_[at(point.queue)].submitted) return refuse("a wait for value", point.queue, point.value);
+        if (point.value > lines_[at(point.queue)].submitted)
+            return refuse("a wait for value", point.queue, point.value);
     return {};
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// How tests steer null devices. NullSettings are those of the devices that are created next; a NullControl belongs to one
-// device and outlives it, so that a test can count what the device left behind.
+// How tests steer null devices. NullSettings are those of the devices that are created next; a NullControl belongs to
+// one device and outlives it, so that a test can count what the device left behind.
 
 #include <platform/null/hazard_checker.h>
 
@@ -22,14 +22,14 @@
 namespace glint::null {
 
 struct NullSettings {
-    FeatureMask missing = 0;        ///< features that the adapter lacks
-    uint64_t memory = 1ull << 30;   ///< bytes of all objects together; more fails with OutOfMemory
-    bool mapped = false;            ///< device memory has a host address, as on a CPU or an integrated GPU
+    FeatureMask missing = 0;       ///< features that the adapter lacks
+    uint64_t memory = 1ull << 30;  ///< bytes of all objects together; more fails with OutOfMemory
+    bool mapped = false;           ///< device memory has a host address, as on a CPU or an integrated GPU
     std::array<bool, detail::queue_count> queues = {true, true, true};  ///< Queue::Main is always there
-    uint64_t fail_creation = 0;     ///< the n-th creation of a native object fails with OutOfMemory; 0: none
-    uint64_t fail_submit = 0;       ///< the n-th submission fails with this code; 0: none
+    uint64_t fail_creation = 0;  ///< the n-th creation of a native object fails with OutOfMemory; 0: none
+    uint64_t fail_submit = 0;    ///< the n-th submission fails with this code; 0: none
     ErrorCode fail_code = ErrorCode::OutOfMemory;  ///< or DeviceLost
-    bool judge = true;              ///< by the hazard checker
+    bool judge = true;                             ///< by the hazard checker
 };
 
 /// Replaces the settings of devices created from now on, until the end of the scope.
@@ -46,19 +46,19 @@ private:
 
 /// What a device has done so far.
 struct NullCounters {
-    uint64_t creations = 0;       ///< native objects asked for, failed ones included
-    uint64_t objects = 0;         ///< native objects alive
-    uint64_t bytes = 0;           ///< of those
-    uint64_t submits = 0;         ///< tried
-    uint64_t waits = 0;           ///< between queues
+    uint64_t creations = 0;  ///< native objects asked for, failed ones included
+    uint64_t objects = 0;    ///< native objects alive
+    uint64_t bytes = 0;      ///< of those
+    uint64_t submits = 0;    ///< tried
+    uint64_t waits = 0;      ///< between queues
     uint64_t lists = 0;
     uint64_t commands = 0;
     uint64_t dispatches = 0;
-    uint64_t draws = 0;           ///< of an indirect command, each
-    uint64_t builds = 0;          ///< and updates of acceleration structures
-    uint64_t barriers = 0;        ///< memory barriers
+    uint64_t draws = 0;     ///< of an indirect command, each
+    uint64_t builds = 0;    ///< and updates of acceleration structures
+    uint64_t barriers = 0;  ///< memory barriers
     uint64_t image_barriers = 0;
-    uint64_t splits = 0;          ///< of targets
+    uint64_t splits = 0;  ///< of targets
 };
 
 /// All methods may be called from any thread.
@@ -72,8 +72,8 @@ public:
     NullCounters counters() const;
     /// What is wrong with what was submitted so far: findings of the checker, and
     /// "null.destroyed_in_use" (a native object was deleted before the queues had passed its last use),
-    /// "null.outlived" (a native object was deleted after its back end), "null.undeclared" (a command reaches memory that
-    /// no access of it names), "null.range" (a command reaches beyond the end of a buffer or a texture).
+    /// "null.outlived" (a native object was deleted after its back end), "null.undeclared" (a command reaches memory
+    /// that no access of it names), "null.range" (a command reaches beyond the end of a buffer or a texture).
     std::vector<Error> findings() const;
     void clearFindings();
 
@@ -124,7 +124,7 @@ private:
     struct TimeLine {
         uint64_t submitted = 0;
         uint64_t completed = 0;
-        uint64_t released = 0;       ///< while held: up to this value
+        uint64_t released = 0;  ///< while held: up to this value
         bool held = false;
         std::deque<Pending> pending;
     };
@@ -139,7 +139,7 @@ private:
     NullCounters counters_;
     std::vector<Error> findings_;
     std::array<TimeLine, detail::queue_count> lines_;
-    uint64_t fail_creation_ = 0;     ///< counted as in counters_
+    uint64_t fail_creation_ = 0;  ///< counted as in counters_
     uint64_t fail_submit_ = 0;
     ErrorCode fail_code_ = ErrorCode::OutOfMemory;
     uint64_t ids_ = 0;

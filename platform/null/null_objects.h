@@ -48,7 +48,7 @@ struct NullObject {
 /// An object whose accesses are judged.
 struct NullMemory : NullObject {
     using NullObject::NullObject;
-    uint32_t mips = 0;    ///< 0 for what is no texture
+    uint32_t mips = 0;  ///< 0 for what is no texture
     uint32_t layers = 0;
 };
 
@@ -83,7 +83,9 @@ struct NullTexture final : detail::NativeTexture, NullMemory {
     /// Bytes of all layers, mip levels and samples.
     static uint64_t size(const detail::NativeTextureDesc& desc);
     /// First texel of a layer of a mip level, sample by sample.
-    std::byte* texels(uint32_t mip, uint32_t layer) const { return bytes.data() + layer * layer_size + mip_offsets[mip]; }
+    std::byte* texels(uint32_t mip, uint32_t layer) const {
+        return bytes.data() + layer * layer_size + mip_offsets[mip];
+    }
 
     const TextureDesc desc;
     const uint32_t samples;
@@ -117,7 +119,7 @@ struct NullTracing final : detail::NativeTracing, NullMemory {
     std::vector<const detail::Object*> inputs;  ///< buffers of its geometries
     std::vector<uint64_t> references;           ///< addresses in the instances it was built from, each once
     uint64_t compacted_size = 0;
-    uint64_t written_size = 0;                  ///< by the last WriteTracingSize
+    uint64_t written_size = 0;  ///< by the last WriteTracingSize
 };
 
 struct NullQuery final : detail::NativeQuery, NullObject {
@@ -133,7 +135,7 @@ struct InstanceRecord {
     float transform[12];
     uint32_t data_and_mask;
     uint32_t offset_and_flags;
-    uint64_t address;        ///< of the structure, 0 for none
+    uint64_t address;  ///< of the structure, 0 for none
 };
 static_assert(sizeof(InstanceRecord) == 64);
 

@@ -35,8 +35,12 @@ struct Grid {
     }
     /// A region of texels in blocks.
     Region blocks(const Region& region) const {
-        return {region.x / block, region.y / block, region.z, (region.width + block - 1) / block,
-                (region.height + block - 1) / block, region.depth};
+        return {region.x / block,
+                region.y / block,
+                region.z,
+                (region.width + block - 1) / block,
+                (region.height + block - 1) / block,
+                region.depth};
     }
 
     uint32_t block;
@@ -171,8 +175,10 @@ void NullPlayer::play(const CopyBufferTextureCommand& command) {
         for (uint32_t z = 0; z < blocks.depth; z++) {
             for (uint32_t y = 0; y < blocks.height; y++, memory += row) {
                 std::byte* line = texels + grid.offset(blocks.x, blocks.y + y, blocks.z + z);
-                if (command.header.type == CommandType::CopyBufferToTexture) std::memcpy(line, memory, row);
-                else std::memcpy(memory, line, row);
+                if (command.header.type == CommandType::CopyBufferToTexture)
+                    std::memcpy(line, memory, row);
+                else
+                    std::memcpy(memory, line, row);
             }
         }
     }
@@ -230,7 +236,8 @@ void NullPlayer::play(const BuildTracingsCommand& command) {
     for (const TracingBuild& build : std::span(list_->at<TracingBuild>(command.builds), command.count)) {
         auto& tracing = native<NullTracing>(build.tracing);
         counters_.builds++;
-        if (tracing.is_compacted && !build.update) complain(build.tracing, "it was compacted and has no room for a build");
+        if (tracing.is_compacted && !build.update)
+            complain(build.tracing, "it was compacted and has no room for a build");
         bytes(build.scratch, build.scratch_offset, build.update ? tracing.update_size : tracing.build_size);
         if (build.instances == none) continue;
         const std::byte* records =
@@ -257,11 +264,7 @@ void NullPlayer::beginTarget(const BeginTargetCommand& command) {
         const auto& texture = native<NullTexture>(attachment.texture);
         const FormatInfo& info = formatInfo(texture.desc.format);
         ClearValue value;
-        for (size_t i = 0; i < 4; i++) {
-            if (info.type == FormatType::Int) value.u[i] = static_cast<uint32_t>(static_cast<int32_t>(attachment.clear[i]));
-            else if (info.type == FormatType::Uint) value.u[i] = static_cast<uint32_t>(attachment.clear[i]);
-            else value.f[i] = attachment.clear[i];
-        }
+        for (size_t i = 0; i < 4; i++) value.u[i] = clearBits(info.type, attachment.clear[i]);
         if (info.depth) value.u[1] = attachment.clear_stencil;
         clear(texture, attachment.slice, value);
     };
@@ -306,8 +309,10 @@ void NullPlayer::query(const QueryCommand& command) {
         return;
     }
     query.ended = true;
-    if (query.type == Query::TypeTime) query.result = {query.begin[0], now[0]};
-    else for (size_t i = 0; i < now.size(); i++) query.result[i] = now[i] - query.begin[i];
+    if (query.type == Query::TypeTime)
+        query.result = {query.begin[0], now[0]};
+    else
+        for (size_t i = 0; i < now.size(); i++) query.result[i] = now[i] - query.begin[i];
 }
 
 std::byte* NullPlayer::bytes(uint32_t resource, uint64_t offset, uint64_t size) {
@@ -320,7 +325,9 @@ std::byte* NullPlayer::bytes(uint32_t resource, uint64_t offset, uint64_t size) 
 bool NullPlayer::inRange(uint32_t resource, const Slice& slice, const Region& region) {
     const auto& texture = native<NullTexture>(resource);
     const Region all = mipRegion(texture.desc, slice.mip);
-    const auto within = [](uint32_t offset, uint32_t count, uint32_t end) { return offset <= end && count <= end - offset; };
+    const auto within = [](uint32_t offset, uint32_t count, uint32_t end) {
+        return offset <= end && count <= end - offset;
+    };
     if (within(slice.mip, slice.mips, texture.desc.mipmaps) && within(slice.layer, slice.layers, texture.desc.layers) &&
         within(region.x, region.width, all.width) && within(region.y, region.height, all.height) &&
         within(region.z, region.depth, all.depth))

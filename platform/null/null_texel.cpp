@@ -51,7 +51,8 @@ void encodeTexel(Format format, const ClearValue& value, std::byte* texel) {
         case FormatDf32Su8:
             return put(texel, glm::floatBitsToUint(f[0]) | static_cast<uint64_t>(value.u[1] & 0xff) << 32, 8);
         case FormatRGBu10Au2n:
-            return put(texel, unorm(f[0], 10) | unorm(f[1], 10) << 10 | unorm(f[2], 10) << 20 | unorm(f[3], 2) << 30, 4);
+            return put(texel, unorm(f[0], 10) | unorm(f[1], 10) << 10 | unorm(f[2], 10) << 20 | unorm(f[3], 2) << 30,
+                       4);
         case FormatRGBf11f11f10: return put(texel, glm::packF2x11_1x10({f[0], f[1], f[2]}), 4);
         case FormatRGBEu9e5: return put(texel, glm::packF3x9_E1x5({f[0], f[1], f[2]}), 4);
         default: break;

@@ -77,7 +77,8 @@ Outcome runScene(Device& device, bool careful) {
     const std::vector<uint32_t> many(1u << 19, 2);
     const Buffer large = device.createBuffer(Buffer::FlagStorage | Buffer::FlagVertex, std::span(many), "large");
     if (!good(large)) return outcome;
-    const Texture image = device.createTexture2D(FormatRGBAu8n, 16, 16, Texture::FlagSurface | Texture::FlagMipmaps, "image");
+    const Texture image =
+        device.createTexture2D(FormatRGBAu8n, 16, 16, Texture::FlagSurface | Texture::FlagMipmaps, "image");
     if (!good(image)) return outcome;
     const Texture picture = device.createTexture2D(FormatRGBAu8n, 16, 16, Texture::FlagTarget, "picture");
     if (!good(picture)) return outcome;

@@ -76,9 +76,9 @@ TEST_F(HazardChecker, ReadsNeedNoOrder) {
 }
 
 TEST_F(HazardChecker, OneCommandDoesNotConflictWithItself) {
-    EXPECT_THAT(judged(List().draw({reads(a, Stage::VertexInput), writes(a, Stage::Fragment),
-                                    writes(a, Stage::VertexShader)})),
-                IsEmpty());
+    EXPECT_THAT(
+        judged(List().draw({reads(a, Stage::VertexInput), writes(a, Stage::Fragment), writes(a, Stage::VertexShader)})),
+        IsEmpty());
 }
 
 TEST_F(HazardChecker, WhatFollowsMustComeAfterEveryStageOfACommand) {
@@ -110,16 +110,14 @@ TEST_F(HazardChecker, ReadAndWriteOfOneCommandAreBothComparedWithEarlierOnes) {
 }
 
 TEST_F(HazardChecker, StagesOfABarrierCount) {
-    EXPECT_THAT(judged(List()
-                           .dispatch({writes(a, Stage::Compute)})
-                           .barrier(copy, compute)
-                           .dispatch({reads(a, Stage::Compute)})),
-                ElementsAre(read_after_write));
-    EXPECT_THAT(judged(List()
-                           .dispatch({writes(b, Stage::Compute)})
-                           .barrier(compute, copy)
-                           .dispatch({reads(b, Stage::Compute)})),
-                ElementsAre(read_after_write));
+    EXPECT_THAT(
+        judged(
+            List().dispatch({writes(a, Stage::Compute)}).barrier(copy, compute).dispatch({reads(a, Stage::Compute)})),
+        ElementsAre(read_after_write));
+    EXPECT_THAT(
+        judged(
+            List().dispatch({writes(b, Stage::Compute)}).barrier(compute, copy).dispatch({reads(b, Stage::Compute)})),
+        ElementsAre(read_after_write));
     EXPECT_THAT(judged(List()
                            .dispatch({writes(c, Stage::Compute)})
                            .barrier(compute | copy, copy | compute)
@@ -139,8 +137,10 @@ TEST_F(HazardChecker, EarlierStagesOfAPipelineAreOrderedToo) {
                            .barrier(compute, stages(Stage::VertexShader))
                            .draw({writes(b, Stage::Fragment)})),
                 IsEmpty());
-    EXPECT_THAT(judged(List().draw({reads(c, Stage::Fragment)}).barrier(stages(Stage::VertexShader), compute).dispatch(
-                    {writes(c, Stage::Compute)})),
+    EXPECT_THAT(judged(List()
+                           .draw({reads(c, Stage::Fragment)})
+                           .barrier(stages(Stage::VertexShader), compute)
+                           .dispatch({writes(c, Stage::Compute)})),
                 ElementsAre(write_after_read));
     checker = makeChecker();
     // That is order: what they wrote is not made visible.
@@ -209,8 +209,9 @@ TEST_F(HazardChecker, EarlierListsAndSubmissionsCount) {
     EXPECT_THAT(judged(List().dispatch({reads(a, Stage::Compute)})), ElementsAre(read_after_write));
     EXPECT_THAT(judged(List().barrier(compute, compute).dispatch({writes(a, Stage::Compute)})), IsEmpty());
 
-    const auto found = judge(checker, Queue::Main, 100, {List().dispatch({reads(b, Stage::Compute)}),
-                                                         List().dispatch({writes(b, Stage::Compute)})});
+    const auto found =
+        judge(checker, Queue::Main, 100,
+              {List().dispatch({reads(b, Stage::Compute)}), List().dispatch({writes(b, Stage::Compute)})});
     EXPECT_THAT(ids(found), ElementsAre(write_after_read));
 }
 
@@ -409,8 +410,9 @@ TEST_F(HazardChecker, SubresourcesAreApart) {
     for (uint16_t layer = 0; layer < 2; layer++)
         for (uint16_t mip = 0; mip < 3; mip++) list.dispatch({touch(AccessWrite, level(mip, layer))});
     EXPECT_THAT(judged(list), IsEmpty());
-    EXPECT_THAT(judged(List().barrier(compute, compute).dispatch(
-                    {touch(AccessRead, level(0, 0)), touch(AccessWrite, level(1, 0))})),
+    EXPECT_THAT(judged(List()
+                           .barrier(compute, compute)
+                           .dispatch({touch(AccessRead, level(0, 0)), touch(AccessWrite, level(1, 0))})),
                 IsEmpty());
     EXPECT_THAT(judged(List().dispatch({touch(AccessRead, level(1, 1)), touch(AccessRead, level(2, 1))})), IsEmpty());
     EXPECT_THAT(judged(List().dispatch({touch(AccessRead, {0, 3, 0, 1})})), ElementsAre(read_after_write));
@@ -454,10 +456,12 @@ TEST_F(HazardChecker, DroppedContentsMustNotBeRead) {
                 IsEmpty());
     EXPECT_THAT(judged(List().turn(image, Layout::Undefined, Layout::General, compute, compute).dispatch({loaded})),
                 ElementsAre("hazard.discard"));
-    EXPECT_THAT(judged(List().barrier(compute, compute).dispatch({stored}).barrier(compute, compute).dispatch({loaded})),
-                ElementsAre("hazard.discard"));
-    EXPECT_THAT(judged(List().barrier(compute, compute).dispatch({replaced}).barrier(compute, compute).dispatch({loaded})),
-                IsEmpty());
+    EXPECT_THAT(
+        judged(List().barrier(compute, compute).dispatch({stored}).barrier(compute, compute).dispatch({loaded})),
+        ElementsAre("hazard.discard"));
+    EXPECT_THAT(
+        judged(List().barrier(compute, compute).dispatch({replaced}).barrier(compute, compute).dispatch({loaded})),
+        IsEmpty());
 }
 
 // Targets.
@@ -466,8 +470,9 @@ TEST_F(HazardChecker, DrawsToATargetNeedNoOrder) {
     Thing depth{.id = 30, .mips = 1, .layers = 1, .name = "depth"};
     const StageMask depth_stage = stages(Stage::DepthTarget);
     EXPECT_THAT(judged(List()
-                           .barrier(0, 0, {{&image, Layout::Undefined, Layout::ColorTarget, 0, color},
-                                           {&depth, Layout::Undefined, Layout::DepthTarget, 0, depth_stage}})
+                           .barrier(0, 0,
+                                    {{&image, Layout::Undefined, Layout::ColorTarget, 0, color},
+                                     {&depth, Layout::Undefined, Layout::DepthTarget, 0, depth_stage}})
                            .begin({{&image, Stage::ColorTarget, AccessWrite | AccessDiscard, Layout::ColorTarget},
                                    {&depth, Stage::DepthTarget, AccessWrite | AccessDiscard, Layout::DepthTarget}})
                            .draw({reads(a, Stage::VertexInput)})
@@ -550,8 +555,9 @@ TEST_F(HazardChecker, DrawsMustNotUseTheirAttachments) {
     const Slice first{0, 1, 0, 1}, second{1, 1, 0, 1};
     const auto list = [&](Slice sampled) {
         List made;
-        made.barrier(0, 0, {{&atlas, Layout::Undefined, Layout::ColorTarget, color | fragment, color, first},
-                            {&atlas, Layout::Undefined, Layout::Sampled, color | fragment, fragment, second}});
+        made.barrier(0, 0,
+                     {{&atlas, Layout::Undefined, Layout::ColorTarget, color | fragment, color, first},
+                      {&atlas, Layout::Undefined, Layout::Sampled, color | fragment, fragment, second}});
         made.begin({{&atlas, Stage::ColorTarget, AccessWrite | AccessDiscard, Layout::ColorTarget, first}});
         made.draw({{&atlas, Stage::Fragment, AccessRead, Layout::Sampled, sampled}});
         return made.end();
@@ -584,8 +590,9 @@ TEST_F(HazardChecker, WaitsOrderEverythingUpToTheirValue) {
     EXPECT_THAT(judged(List().dispatch({writes(a, Stage::Compute)})), IsEmpty());
     EXPECT_THAT(judged(List().dispatch({writes(b, Stage::Compute)})), IsEmpty());
     EXPECT_THAT(judged(List().dispatch({writes(c, Stage::Compute)})), IsEmpty());
-    EXPECT_THAT(judged(List().dispatch({reads(a, Stage::Copy), reads(b, Stage::Copy)}), Queue::Copy, {{Queue::Main, 2}}),
-                IsEmpty());
+    EXPECT_THAT(
+        judged(List().dispatch({reads(a, Stage::Copy), reads(b, Stage::Copy)}), Queue::Copy, {{Queue::Main, 2}}),
+        IsEmpty());
     EXPECT_THAT(judged(List().dispatch({reads(c, Stage::Copy)}), Queue::Copy), ElementsAre(read_after_write));
 }
 
@@ -598,9 +605,9 @@ TEST_F(HazardChecker, WaitsServeLaterSubmissionsToo) {
 TEST_F(HazardChecker, OrderPassesFromQueueToQueue) {
     EXPECT_THAT(judged(List().dispatch({writes(a, Stage::Compute)})), IsEmpty());
     EXPECT_THAT(judged(List().dispatch({}), Queue::Compute, {{Queue::Main, 1}}), IsEmpty());
-    EXPECT_THAT(judged(List().command(CommandType::CopyBuffer, {reads(a, Stage::Copy)}), Queue::Copy,
-                       {{Queue::Compute, 1}}),
-                IsEmpty());
+    EXPECT_THAT(
+        judged(List().command(CommandType::CopyBuffer, {reads(a, Stage::Copy)}), Queue::Copy, {{Queue::Compute, 1}}),
+        IsEmpty());
 }
 
 TEST_F(HazardChecker, WaitOfTheOtherQueueCarriesNothingBack) {
@@ -612,14 +619,14 @@ TEST_F(HazardChecker, WaitOfTheOtherQueueCarriesNothingBack) {
 
 TEST_F(HazardChecker, TransitionAfterAWait) {
     const Touch stored{&image, Stage::Compute, AccessWrite, Layout::General};
-    EXPECT_THAT(judged(List().turn(image, Layout::Undefined, Layout::General, 0, compute).dispatch({stored}),
-                       Queue::Compute),
-                IsEmpty());
+    EXPECT_THAT(
+        judged(List().turn(image, Layout::Undefined, Layout::General, 0, compute).dispatch({stored}), Queue::Compute),
+        IsEmpty());
     // Without a source the transition does not even wait for what the wait ordered.
     null::HazardChecker before = checker;
-    EXPECT_THAT(judged(List().turn(image, Layout::General, Layout::Sampled, 0, fragment), Queue::Main,
-                       {{Queue::Compute, 1}}),
-                ElementsAre(write_after_write));
+    EXPECT_THAT(
+        judged(List().turn(image, Layout::General, Layout::Sampled, 0, fragment), Queue::Main, {{Queue::Compute, 1}}),
+        ElementsAre(write_after_write));
     checker = before;
     EXPECT_THAT(judged(List()
                            .turn(image, Layout::General, Layout::Sampled, detail::stage_all, fragment)

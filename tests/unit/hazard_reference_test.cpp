@@ -22,13 +22,13 @@ enum Level : uint8_t { Nothing, Ordered, Available, Visible };
 struct Step {
     enum Kind { Access, Barrier, Transition, Signal, Wait } kind = Access;
     uint32_t queue = 0;
-    uint32_t group = 0;            ///< steps of one command, or of one barrier command: they do not order each other
-    StageMask source = 0;          ///< Access: its stage
+    uint32_t group = 0;    ///< steps of one command, or of one barrier command: they do not order each other
+    StageMask source = 0;  ///< Access: its stage
     StageMask destination = 0;
     std::pair<uint64_t, uint32_t> memory = {};  ///< Access, Transition: thing and part
     bool write = false;
-    uint32_t other = 0;            ///< Wait: the queue
-    uint64_t value = 0;            ///< Signal, Wait
+    uint32_t other = 0;  ///< Wait: the queue
+    uint64_t value = 0;  ///< Signal, Wait
 };
 
 /// Index of the first step that conflicts with an earlier one which is not ordered before it, none if all is well.
@@ -93,11 +93,15 @@ private:
                         if (b.group == a.group) break;
                         Level result = Nothing;
                         if (b.kind == Step::Barrier || same) {
-                            if (own || level >= Available) result = Visible;
-                            else if (level == Ordered) result = Ordered;
+                            if (own || level >= Available)
+                                result = Visible;
+                            else if (level == Ordered)
+                                result = Ordered;
                         } else {
-                            if (level >= Available) result = Available;
-                            else if (own || level == Ordered) result = Ordered;
+                            if (level >= Available)
+                                result = Available;
+                            else if (own || level == Ordered)
+                                result = Ordered;
                         }
                         results.emplace_back(&b, result);
                         break;
@@ -123,8 +127,10 @@ private:
             for (const auto& [step, level] : results) {
                 for (size_t s = 0; s < slots; s++) {
                     Level& there = levels[step->queue][s];
-                    if (step->destination >> s & 1) there = std::max(there, level);
-                    else if (withLater(step->destination) >> s & 1) there = std::max(there, std::min(level, Available));
+                    if (step->destination >> s & 1)
+                        there = std::max(there, level);
+                    else if (withLater(step->destination) >> s & 1)
+                        there = std::max(there, std::min(level, Available));
                 }
             }
             i = end;
@@ -162,7 +168,7 @@ public:
 
     struct Verdict {
         size_t submissions = 0;
-        std::optional<size_t> fast;   ///< submission with the first finding
+        std::optional<size_t> fast;  ///< submission with the first finding
         std::optional<size_t> slow;
     };
 
@@ -179,7 +185,8 @@ public:
                 if (values_[other] == 0 || slips()) continue;
                 const uint64_t value = slips() ? 1 + below(values_[other]) : values_[other];
                 waits.push_back({static_cast<Queue>(other), value});
-                steps_.push_back({.kind = Step::Wait, .queue = queue, .group = ++group_, .other = other, .value = value});
+                steps_.push_back(
+                    {.kind = Step::Wait, .queue = queue, .group = ++group_, .other = other, .value = value});
             }
             std::vector<List> lists(1 + below(2));
             for (List& list : lists)
@@ -240,19 +247,26 @@ private:
         if (source || !turns.empty()) {
             group_++;
             list.barrier(source, destination, turns);
-            steps_.push_back({.kind = Step::Barrier, .queue = queue, .group = group_, .source = source,
-                              .destination = destination});
+            steps_.push_back(
+                {.kind = Step::Barrier, .queue = queue, .group = group_, .source = source, .destination = destination});
             for (const Turn& turn : turns)
-                steps_.push_back({.kind = Step::Transition, .queue = queue, .group = group_, .source = turn.source,
-                                  .destination = turn.destination, .memory = {turn.thing->id, turn.slice.mip},
+                steps_.push_back({.kind = Step::Transition,
+                                  .queue = queue,
+                                  .group = group_,
+                                  .source = turn.source,
+                                  .destination = turn.destination,
+                                  .memory = {turn.thing->id, turn.slice.mip},
                                   .write = true});
         }
         group_++;
         list.dispatch(touches);
         for (const Touch& touch : touches)
-            steps_.push_back({.kind = Step::Access, .queue = queue, .group = group_,
+            steps_.push_back({.kind = Step::Access,
+                              .queue = queue,
+                              .group = group_,
                               .source = detail::bit(touch.stage),
-                              .memory = {touch.thing->id, touch.slice.mip}, .write = (touch.flags & AccessWrite) != 0});
+                              .memory = {touch.thing->id, touch.slice.mip},
+                              .write = (touch.flags & AccessWrite) != 0});
     }
 
     static constexpr std::array used_stages = {Stage::Compute, Stage::Copy, Stage::VertexShader, Stage::Fragment,

@@ -103,9 +103,12 @@ public:
 
     /// Before the next command.
     List& barrier(StageMask source, StageMask destination, const std::vector<Turn>& turns = {}, bool split = false) {
-        detail::Barrier barrier{.command = list_->command_count, .source = source, .destination = destination,
+        detail::Barrier barrier{.command = list_->command_count,
+                                .source = source,
+                                .destination = destination,
                                 .first_image = static_cast<uint32_t>(images_.size()),
-                                .image_count = static_cast<uint32_t>(turns.size()), .split = split};
+                                .image_count = static_cast<uint32_t>(turns.size()),
+                                .split = split};
         for (const Turn& turn : turns)
             images_.push_back({index(turn.thing), turn.slice, turn.from, turn.to, turn.source, turn.destination});
         barriers_.push_back(barrier);
@@ -155,8 +158,8 @@ struct Wait {
 };
 
 /// Judges one submission.
-inline std::vector<Error> judge(null::HazardChecker& checker, Queue queue, uint64_t value, const std::vector<List>& lists,
-                                const std::vector<Wait>& waits = {}) {
+inline std::vector<Error> judge(null::HazardChecker& checker, Queue queue, uint64_t value,
+                                const std::vector<List>& lists, const std::vector<Wait>& waits = {}) {
     std::vector<detail::ResolvedList> resolved;
     for (const List& list : lists) resolved.push_back(list.resolved());
     std::vector<detail::TimelinePoint> points;

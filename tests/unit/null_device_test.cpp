@@ -37,8 +37,10 @@ protected:
         device = {};
         const ScopedSettings scope(settings);
         device = Device::create({.api = "null", .required = required, .message = [this](const Message& message) {
-                                     if (expected == message.error.id()) told++;
-                                     else ADD_FAILURE() << message.error.text();
+                                     if (expected == message.error.id())
+                                         told++;
+                                     else
+                                         ADD_FAILURE() << message.error.text();
                                  }});
         if (device) control = NullControl::last();
     }
@@ -140,17 +142,15 @@ TEST_F(NullDevice, TexturesKeepWhatTheyAreGiven) {
     EXPECT_EQ(readTexture<uint32_t>(texture), values);
 
     device.createMipmaps(texture);
-    EXPECT_THAT(readTexture<uint32_t>(texture, {1, 1, 0, 1}),
-                testing::ElementsAre(1, 3, 5, 7, 17, 19, 21, 23));
+    EXPECT_THAT(readTexture<uint32_t>(texture, {1, 1, 0, 1}), testing::ElementsAre(1, 3, 5, 7, 17, 19, 21, 23));
 
     const Texture other = device.createTexture2D(FormatRu32, 8, 4, 0, "other");
     device.clearTexture(other, {9, 0, 0, 0});
     device.copyTexture(other, {}, texture, {0, 1, 0, 1}, {2, 1, 0, 3, 2, 1}, 4, 2);
-    EXPECT_THAT(readTexture<uint32_t>(other),
-                testing::ElementsAre(9, 9, 9, 9, 9, 9, 9, 9,  //
-                                     9, 9, 9, 9, 9, 9, 9, 9,  //
-                                     9, 9, 9, 9, 11, 12, 13, 9,  //
-                                     9, 9, 9, 9, 19, 20, 21, 9));
+    EXPECT_THAT(readTexture<uint32_t>(other), testing::ElementsAre(9, 9, 9, 9, 9, 9, 9, 9,     //
+                                                                   9, 9, 9, 9, 9, 9, 9, 9,     //
+                                                                   9, 9, 9, 9, 11, 12, 13, 9,  //
+                                                                   9, 9, 9, 9, 19, 20, 21, 9));
 }
 
 TEST_F(NullDevice, RegionsOfCompressedAndDeepTextures) {
@@ -441,7 +441,8 @@ TEST_F(NullDevice, SubmissionsFailOnRequest) {
 
 struct Raw : testing::Test {
     void SetUp() override {
-        auto made = null::createNullBackend({.message = [this](const Error& error, bool) { ids.emplace_back(error.id()); }});
+        auto made =
+            null::createNullBackend({.message = [this](const Error& error, bool) { ids.emplace_back(error.id()); }});
         ASSERT_THAT(made, IsOk());
         backend = std::move(*made);
         control = NullControl::last();
@@ -456,7 +457,8 @@ using NullBackend = Raw;
 TEST_F(NullBackend, ValuesMustGrow) {
     EXPECT_THAT(backend->submit({.queue = Queue::Main, .lists = {}, .waits = {}, .value = 2}), IsOk());
     EXPECT_EQ(backend->completed(Queue::Main), 2u);
-    EXPECT_THAT(backend->submit({.queue = Queue::Main, .lists = {}, .waits = {}, .value = 2}), HasErrorId("null.value"));
+    EXPECT_THAT(backend->submit({.queue = Queue::Main, .lists = {}, .waits = {}, .value = 2}),
+                HasErrorId("null.value"));
     const detail::TimelinePoint future = {Queue::Main, 9};
     EXPECT_THAT(backend->submit({.queue = Queue::Copy, .lists = {}, .waits = {&future, 1}, .value = 1}),
                 HasErrorId("null.value"));
@@ -475,7 +477,8 @@ TEST_F(NullBackend, ObjectsMustNotOutliveIt) {
 
 TEST_F(NullBackend, AddressesAreGivenWhereTheyAreAskedFor) {
     const auto address = [&](Buffer::Flags flags) {
-        auto buffer = backend->createBuffer({.size = 16, .flags = flags, .staging = false, .readback = false, .name = {}});
+        auto buffer =
+            backend->createBuffer({.size = 16, .flags = flags, .staging = false, .readback = false, .name = {}});
         return (*buffer)->address;
     };
     EXPECT_EQ(address(Buffer::FlagStorage), 0u);

@@ -103,9 +103,14 @@ void Target::setClearColor(uint32_t index, const Color& color) {
     if (target) target->colors[index].clear = color;
 }
 
-void Target::setClearDepth(float depth, uint32_t stencil) {
+void Target::setClearDepth(float depth, uint32_t stencil, Where where) {
     auto* target = static_cast<TargetObject*>(object_);
     if (!target) return;
+    if (!(depth >= 0 && depth <= 1)) {
+        target->fail(makeError(where, ErrorCode::OutOfRange, "clear.depth", "{}: depth {}; it is 0 to 1",
+                               target->label(), depth));
+        return;
+    }
     target->clear_depth = depth;
     target->clear_stencil = stencil;
 }

@@ -38,7 +38,8 @@ public:
     void setDepthOperation(uint8_t operation);
     void setClearColor(uint32_t index, const Color& color);
     void setClearColor(const Color& color) { setClearColor(0, color); }
-    void setClearDepth(float depth, uint32_t stencil = 0);
+    /// Depth from 0 to 1 ("clear.depth").
+    void setClearDepth(float depth, uint32_t stencil = 0, Where where = Where::current());
 
     /// Pixels of the smallest texture; 0 without textures.
     uint32_t getWidth() const;

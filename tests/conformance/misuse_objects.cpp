@@ -192,6 +192,9 @@ MISUSE(TargetOfForeignTexture, "handle.device") {
         target.setColorTexture(0, kit.foreign.createTexture2D(FormatRGBAu8n, 8, 8, Texture::FlagTarget));
     });
 }
+MISUSE(TargetClearedTooDeep, "clear.depth") {
+    return targeted(kit, [&](Target& target) { target.setClearDepth(1.5f); });
+}
 MISUSE(CommandWithoutTarget, "handle.null") {
     Command list = kit.device.createCommand(Target());
     return kit.device.submit(list).error();

@@ -2,6 +2,7 @@
 
 #include "conformance/misuse.h"
 
+#include <cmath>
 #include <limits>
 
 namespace glint::test {
@@ -436,6 +437,11 @@ MISUSE(CopyOutsideTheDestination, "texture.region") {
 MISUSE(ClearOfBlocks, "clear.format") {
     return transferred(
         kit, [&](Device& device) { device.clearTexture(device.createTexture2D(FormatBC1RGBAu8n, 8, 8), Color()); });
+}
+MISUSE(ClearOfUnknownDepth, "clear.depth") {
+    return transferred(kit, [&](Device& device) {
+        device.clearTexture(kit.texture(Texture::FlagTarget, FormatDf32), Color{std::nanf(""), 0, 0, 0});
+    });
 }
 MISUSE(MipmapsOfIntegers, "mipmaps.format") {
     return transferred(kit,

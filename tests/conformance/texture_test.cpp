@@ -2,6 +2,8 @@
 
 #include <cmath>
 #include <cstring>
+#include <limits>
+#include <tuple>
 
 namespace glint::test {
 
@@ -183,6 +185,41 @@ TEST_P(TextureTest, ClearsEveryClassOfFormat) {
     float value;
     std::memcpy(&value, real.data(), 4);
     EXPECT_EQ(value, -1.5f);
+}
+
+TEST_P(TextureTest, ClearsOfIntegersAreKeptInRange) {
+    constexpr float infinite = std::numeric_limits<float>::infinity();
+    const std::tuple<float, uint32_t, int32_t> cases[] = {
+        {-1, 0, -1},
+        {1e20f, UINT32_MAX, INT32_MAX},
+        {-1e20f, 0, INT32_MIN},
+        {infinite, UINT32_MAX, INT32_MAX},
+        {-infinite, 0, INT32_MIN},
+        {std::numeric_limits<float>::quiet_NaN(), 0, 0},
+        {2147483648.0f, 2147483648u, INT32_MAX},
+        {2.9f, 2, 2},
+    };
+    for (const auto& [value, expected_uint, expected_int] : cases) {
+        SCOPED_TRACE(value);
+        const Texture whole = makeTexture(FormatRu32, 2, 2);
+        const Texture negative = makeTexture(FormatRi32, 2, 2);
+        device.clearTexture(whole, Color{value, 0, 0, 0});
+        device.clearTexture(negative, Color{value, 0, 0, 0});
+        EXPECT_EQ(readTexture<uint32_t>(whole), std::vector<uint32_t>(4, expected_uint));
+        EXPECT_EQ(readTexture<int32_t>(negative), std::vector<int32_t>(4, expected_int));
+        // The same through a target.
+        device.clearTexture(whole, Color{});
+        device.clearTexture(negative, Color{});
+        Target target = device.createTarget();
+        target.setColorTexture(0, whole);
+        target.setColorTexture(1, negative);
+        target.setClearColor(0, Color{value, 0, 0, 0});
+        target.setClearColor(1, Color{value, 0, 0, 0});
+        Command list = device.createCommand(target);
+        submit(list);
+        EXPECT_EQ(readTexture<uint32_t>(whole), std::vector<uint32_t>(4, expected_uint));
+        EXPECT_EQ(readTexture<int32_t>(negative), std::vector<int32_t>(4, expected_int));
+    }
 }
 
 TEST_F(TextureShaderTest, MipmapsAverage) {

@@ -280,6 +280,9 @@ void RecorderCore::clearTexture(const Texture& texture, const Color& color, Slic
     if (info.compressed)
         return fail(where, ErrorCode::InvalidArgument, "clear.format", "clearTexture: {} has the compressed format {}",
                     object->label(), info.name);
+    if (info.depth && !(color.r >= 0 && color.r <= 1))
+        return fail(where, ErrorCode::OutOfRange, "clear.depth", "clearTexture: depth {} for {}; it is 0 to 1", color.r,
+                    object->label());
     if (!resolve(*object, slice, "clearTexture", where)) return;
     const uint32_t resource = use(*object);
     beginAccesses();
@@ -288,14 +291,8 @@ void RecorderCore::clearTexture(const Texture& texture, const Color& color, Slic
     command.texture = resource;
     command.slice = slice;
     const float values[4] = {color.r, color.g, color.b, color.a};
-    for (size_t i = 0; i < 4; i++) {
-        if (info.type == FormatType::Int)
-            command.value.u[i] = static_cast<uint32_t>(static_cast<int32_t>(values[i]));
-        else if (info.type == FormatType::Uint || (info.depth && i == 1))
-            command.value.u[i] = static_cast<uint32_t>(values[i]);
-        else
-            command.value.f[i] = values[i];
-    }
+    for (size_t i = 0; i < 4; i++)
+        command.value.u[i] = clearBits(info.depth && i == 1 ? FormatType::Uint : info.type, values[i]);
 }
 
 void RecorderCore::createMipmaps(const Texture& texture, Where where) {

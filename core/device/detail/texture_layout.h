@@ -6,6 +6,7 @@
 #include <glint/device/types.h>
 
 #include <algorithm>
+#include <bit>
 #include <cstdint>
 
 namespace glint::detail {
@@ -15,6 +16,18 @@ inline uint32_t mipSize(uint32_t size, uint32_t mip) { return std::max(size >> m
 /// All texels of a mip level.
 inline Region mipRegion(const TextureDesc& desc, uint32_t mip) {
     return {0, 0, 0, mipSize(desc.width, mip), mipSize(desc.height, mip), mipSize(desc.depth, mip)};
+}
+
+/// One channel of a clear colour as a format of this type holds it: integers are cut off towards zero and kept within
+/// 32 bits, NaN is 0.
+inline uint32_t clearBits(FormatType type, float value) {
+    if (type == FormatType::Uint) {
+        if (!(value > 0.0f)) return 0;
+        return value < 0x1p32f ? static_cast<uint32_t>(value) : UINT32_MAX;
+    }
+    if (type != FormatType::Int) return std::bit_cast<uint32_t>(value);
+    if (!(value > -0x1p31f)) return value == value ? 0x80000000u : 0u;
+    return value < 0x1p31f ? static_cast<uint32_t>(static_cast<int32_t>(value)) : 0x7fffffffu;
 }
 
 /// Bytes of tightly packed texels of a resolved region; partial blocks of compressed formats count whole.

@@ -98,10 +98,12 @@ Owner ownerOf(void* address) {
 
 extern "C" {
 
+// NOLINTBEGIN(bugprone-reserved-identifier): the C library's names
 void* __libc_malloc(size_t size);
 void* __libc_calloc(size_t count, size_t size);
 void* __libc_realloc(void* memory, size_t size);
 void* __libc_memalign(size_t alignment, size_t size);
+// NOLINTEND(bugprone-reserved-identifier)
 
 // Over the C library's: operator new ends here too, and what it returns may go to the C library's free.
 [[gnu::noinline]] void* malloc(size_t size) noexcept {

@@ -71,6 +71,7 @@ Run start(const std::vector<std::string>& command, const std::filesystem::path& 
     std::filesystem::remove(picture);
     FileWatch watch(picture.parent_path());
     std::vector<char*> arguments;
+    arguments.reserve(command.size() + 1);
     for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
     arguments.push_back(nullptr);
     posix_spawn_file_actions_t actions;

@@ -58,9 +58,9 @@ std::vector<Matrix> transforms(float angle) {
     std::vector<Matrix> matrices;
     for (uint32_t i = 0; i < instance_count; i++) {
         const uint32_t cell = i % (columns * columns);
-        const auto layer = static_cast<float>(i / (columns * columns));
-        matrices.push_back(
-            {{c, -s, 0, coordinate(cell % columns), s, c, 0, coordinate(cell / columns), 0, 0, 1, layer * -2.0f}});
+        const uint32_t layer = i / (columns * columns);
+        matrices.push_back({{c, -s, 0, coordinate(cell % columns), s, c, 0, coordinate(cell / columns), 0, 0, 1,
+                             static_cast<float>(layer) * -2.0f}});
     }
     return matrices;
 }

@@ -193,6 +193,8 @@ Status VulkanDevice::submit(const Submission& submission) {
             info.value = point.value;
             info.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
             waits_.push_back(info);
+            // The layer sees no order in time lines, but in fences: without this, every wait is a race to it.
+            if (instance->validation) queue(point.queue).settle(point.value);
         }
         status = queues_[static_cast<size_t>(submission.queue)]->submit(submission, waits_);
     }

@@ -66,6 +66,10 @@ Status Memory::create(const Instance& instance, VkPhysicalDevice adapter, VkDevi
         largest = size;
     }
 
+    // The driver is not to be asked for more than there is (VUID-vkAllocateMemory-pAllocateInfo-01713).
+    VkDeviceSize limits[VK_MAX_MEMORY_HEAPS] = {};
+    for (uint32_t i = 0; i < properties.memoryHeapCount; i++) limits[i] = properties.memoryHeaps[i].size;
+
     VmaVulkanFunctions functions = {};
     functions.vkGetInstanceProcAddr = instance.vk.GetInstanceProcAddr;
     functions.vkGetDeviceProcAddr = instance.vk.GetDeviceProcAddr;
@@ -80,6 +84,7 @@ Status Memory::create(const Instance& instance, VkPhysicalDevice adapter, VkDevi
     info.device = device;
     info.instance = instance.handle;
     info.vulkanApiVersion = VK_API_VERSION_1_3;
+    info.pHeapSizeLimit = limits;
     info.pDeviceMemoryCallbacks = &callbacks;
     info.pVulkanFunctions = &functions;
     const VkResult result = vmaCreateAllocator(&info, &allocator_);

@@ -142,6 +142,13 @@ Status VulkanQueue::submit(const detail::Submission& submission, std::span<const
     return {};
 }
 
+void VulkanQueue::settle(uint64_t value) const {
+    for (const std::unique_ptr<Frame>& frame : pending_) {
+        if (frame->value > value || !frame->fence) return;
+        device_.vk.WaitForFences(device_.handle, 1, &frame->fence, VK_TRUE, UINT64_MAX);
+    }
+}
+
 uint64_t VulkanQueue::completed() const {
     uint64_t value = 0;
     // A lost device may not answer: then nothing more is known to have finished. Some answer with the largest value.

@@ -33,6 +33,8 @@ public:
 
     Status create(const char* name);
     Status submit(const detail::Submission& submission, std::span<const VkSemaphoreSubmitInfo> waits);
+    /// With validation only: waits for the fences of what was submitted up to `value`.
+    void settle(uint64_t value) const;
     /// From any thread.
     uint64_t completed() const;
     /// What ran last and what did not finish, for the message of a lost device.

@@ -16,13 +16,16 @@ find_package(nlohmann_json CONFIG REQUIRED)
 find_package(CLI11 CONFIG REQUIRED)
 find_package(PNG REQUIRED)
 find_package(tinyobjloader CONFIG REQUIRED)
+find_package(TinyGLTF CONFIG REQUIRED)
+set(CMAKE_MESSAGE_LOG_LEVEL WARNING)  # Debian's Imath remarks at length that its Python module is not installed
+find_package(OpenEXR CONFIG REQUIRED)
+unset(CMAKE_MESSAGE_LOG_LEVEL)
+find_package(glfw3 CONFIG REQUIRED)
 
 find_path(GLINT_VMA_INCLUDE_DIR vk_mem_alloc.h REQUIRED)
 add_library(glint_vma INTERFACE)
 target_include_directories(glint_vma SYSTEM INTERFACE "${GLINT_VMA_INCLUDE_DIR}")
 
-find_path(GLINT_VOLK_INCLUDE_DIR volk.h REQUIRED)
-target_include_directories(glint_vma SYSTEM INTERFACE "${GLINT_VOLK_INCLUDE_DIR}")
 target_compile_definitions(glint_vma INTERFACE VK_NO_PROTOTYPES)
 
 find_path(GLINT_XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
@@ -30,3 +33,7 @@ find_library(GLINT_XXHASH_LIBRARY xxhash REQUIRED)
 add_library(glint_xxhash INTERFACE)
 target_include_directories(glint_xxhash SYSTEM INTERFACE "${GLINT_XXHASH_INCLUDE_DIR}")
 target_link_libraries(glint_xxhash INTERFACE "${GLINT_XXHASH_LIBRARY}")
+
+find_path(GLINT_STB_INCLUDE_DIR stb/stb_image.h REQUIRED)
+add_library(glint_stb INTERFACE)
+target_include_directories(glint_stb SYSTEM INTERFACE "${GLINT_STB_INCLUDE_DIR}")

@@ -121,8 +121,7 @@ Tracing Device::createTracing(std::span<const Tracing::Instance> instances, Trac
 Compute Device::createCompute(Queue queue, std::string_view name, Where) {
     DeviceObject* object = opened(*this);
     if (!object) return Compute(detail::RecorderPtr());
-    // Work for a queue that the adapter lacks goes to the main one.
-    return Compute(object->acquireRecorder(object->backend->hasQueue(queue) ? queue : Queue::Main, name));
+    return Compute(object->acquireRecorder(queue, name));
 }
 
 Command Device::createCommand(const Target& target, std::string_view name, Where where) {

@@ -92,8 +92,8 @@ public:
 
     /// Errors: "buffer.size_zero", "buffer.too_large", "buffer.feature", "device.out_of_memory".
     Buffer createBuffer(Buffer::Flags flags, uint64_t size, std::string_view name = {}, Where where = Where::current());
-    template <class T>
-    Buffer createBuffer(Buffer::Flags flags, std::span<T> data, std::string_view name = {},
+    template <class T, size_t N>
+    Buffer createBuffer(Buffer::Flags flags, std::span<T, N> data, std::string_view name = {},
                         Where where = Where::current()) {
         return createBuffer(flags, data.data(), data.size_bytes(), name, where);
     }
@@ -142,8 +142,8 @@ public:
 
     void setBuffer(const Buffer& buffer, uint64_t offset, const void* data, uint64_t size,
                    Where where = Where::current());
-    template <class T>
-    void setBuffer(const Buffer& buffer, std::span<T> data, Where where = Where::current()) {
+    template <class T, size_t N>
+    void setBuffer(const Buffer& buffer, std::span<T, N> data, Where where = Where::current()) {
         setBuffer(buffer, 0, data.data(), data.size_bytes(), where);
     }
     void copyBuffer(const Buffer& destination, uint64_t destination_offset, const Buffer& source,

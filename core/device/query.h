@@ -6,7 +6,8 @@
 
 namespace glint {
 
-/// Measures what the GPU does between beginQuery and endQuery of a recorder. Created by Device::createQuery.
+/// Measures what the GPU does between beginQuery and endQuery of a recorder, once in a list. Created by
+/// Device::createQuery.
 class Query : public Handle {
 public:
     enum Type : uint8_t {

@@ -4,7 +4,9 @@
 
 namespace glint {
 
-/// Work goes to one of these; an adapter without the separate ones runs everything on Main.
+/// Work goes to one of these; an adapter without the separate ones runs everything on Main. Main takes every command;
+/// Compute all but draws, createMipmaps and transfers of depth; Copy nothing but transfers, without clearTexture and
+/// depth: "recorder.queue".
 enum class Queue : uint8_t { Main, Compute, Copy, Count };
 
 struct Color {

@@ -74,8 +74,8 @@ public:
         return device.submit(list).error();
     }
     /// A list without anything set.
-    Error list(const std::function<void(Compute&)>& record) {
-        Compute list = device.createCompute();
+    Error list(const std::function<void(Compute&)>& record, Queue queue = Queue::Main) {
+        Compute list = device.createCompute(queue);
         record(list);
         return device.submit(list).error();
     }

@@ -555,12 +555,42 @@ MISUSE(DrawFromTheTargetItself, "draw.feedback") {
     return kit.device.submit(list).error();
 }
 
+// Queues.
+
+MISUSE(KernelOnTheCopyQueue, "recorder.queue") {
+    return kit.list([&](Compute& list) { list.setKernel(kit.kernel()); }, Queue::Copy);
+}
+MISUSE(ClearOnTheCopyQueue, "recorder.queue") {
+    return kit.list([&](Compute& list) { list.clearTexture(kit.texture(), Color()); }, Queue::Copy);
+}
+MISUSE(MipmapsOnTheComputeQueue, "recorder.queue") {
+    return kit.list([&](Compute& list) { list.createMipmaps(kit.texture(Texture::FlagMipmaps)); }, Queue::Compute);
+}
+MISUSE(DepthClearedOnTheComputeQueue, "recorder.queue") {
+    return kit.list(
+        [&](Compute& list) { list.clearTexture(kit.texture(Texture::FlagTarget, FormatDf32), Color::black()); },
+        Queue::Compute);
+}
+MISUSE(DepthCopiedOnTheComputeQueue, "recorder.queue") {
+    return kit.list(
+        [&](Compute& list) { list.copyTextureToBuffer(kit.buffer(), 0, kit.texture(Texture::FlagTarget, FormatDf32)); },
+        Queue::Compute);
+}
+
 // Queries, regions, submission.
 
 MISUSE(QueryBegunTwice, "query.begun") {
     return kit.list([query = kit.device.createQuery(Query::TypeTime)](Compute& list) {
         list.beginQuery(query);
         list.beginQuery(query);
+    });
+}
+MISUSE(QueryUsedTwice, "query.twice") {
+    return kit.list([query = kit.device.createQuery(Query::TypeTime)](Compute& list) {
+        list.beginQuery(query);
+        list.endQuery(query);
+        list.beginQuery(query);
+        list.endQuery(query);
     });
 }
 MISUSE(QueryEndedUnbegun, "query.not_begun") {

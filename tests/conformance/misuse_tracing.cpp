@@ -183,6 +183,9 @@ MISUSE(BuildOfNull, "handle.null") {
 MISUSE(BuildOfTheUncreated, "handle.not_ready") {
     return built(kit, [&](Device& device) { device.buildTracing(device.createTracing("uncreated")); });
 }
+MISUSE(BuildOnTheCopyQueue, "recorder.queue") {
+    return kit.list([&](Compute& list) { list.buildTracing(kit.triangle()); }, Queue::Copy);
+}
 MISUSE(BuildAfterCompaction, "tracing.compacted") {
     const Tracing triangle = kit.triangle(Tracing::FlagCompact);
     EXPECT_THAT(kit.device.buildTracings({triangle}, Tracing::FlagCompact), IsOk());

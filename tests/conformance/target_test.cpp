@@ -191,7 +191,9 @@ TEST_F(TargetTest, ResolvesSamples) {
             p.setDepthFormat(FormatDf32);
             p.setDepthFunc(Pipeline::DepthFuncLess);
         });
-        // A slanted edge, not along the diagonal of a pixel: pixels on it get some of the samples, wherever those lie.
+        // A slanted edge, not along the diagonal of a pixel: it passes through 28 pixels, at ever other distances from
+        // their centres. Devices place the samples where they like, so how many of the pixels get a part of them is
+        // theirs; 2 samples near the centre, along the edge's direction, are the worst case.
         const std::array<float, 4> triangle[] = {{-1, -1, 0.5f, 1}, {1.3f, -1, 0.5f, 1}, {-1, 0.5f, 0.5f, 1}};
         Command list = device.createCommand(target);
         list.setPipeline(pipeline);
@@ -202,7 +204,7 @@ TEST_F(TargetTest, ResolvesSamples) {
         const size_t partial = result.size() - countPixels(result, red) - countPixels(result, black);
         EXPECT_GT(countPixels(result, red), 90u);
         EXPECT_GT(countPixels(result, black), 90u);
-        EXPECT_GT(partial, 3u);
+        EXPECT_GT(partial, 0u);
     }
 }
 

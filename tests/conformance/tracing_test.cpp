@@ -512,6 +512,43 @@ TEST_F(TracingTest, InstancesComeAndGo) {
     expectAgreement(trace(scene, cast), {{{&sphere}, left}, {{&sphere}, right}, {{&sphere}}}, cast);
 }
 
+TEST_F(TracingTest, RefusedInstancesChangeNothing) {
+    const Tracing ball = bottom({&sphere});
+    Tracing scene = device.createTracing("scene");
+    scene.setInstances(2);
+    ASSERT_THAT(scene.create(Tracing::TypeInstance), IsOk());
+    device.buildTracing(ball);
+    device.setTracing(scene, std::vector{instance(ball)});
+    device.buildTracing(scene);
+    const std::vector<Ray> cast = rays(200);
+    expectAgreement(trace(scene, cast), {{{&sphere}}}, cast);
+
+    std::vector<Tracing::Instance> wrong(2, instance(ball, translate({1, 0, 0})));
+    wrong[1].mask = 0x100;
+    expectError("tracing.instance_bits", [&] {
+        device.setTracing(scene, wrong);
+        return device.flush();
+    });
+    expectAgreement(trace(scene, cast), {{{&sphere}}}, cast);
+    device.buildTracing(scene);
+    expectAgreement(trace(scene, cast), {{{&sphere}}}, cast);
+}
+
+TEST_F(TracingTest, BuildsOfADroppedListAreNone) {
+    const Tracing ball = bottom({&sphere});
+    const Tracing scene = device.createTracing({instance(ball)});
+    {
+        Compute dropped = device.createCompute();
+        dropped.buildTracing(ball);
+        dropped.buildTracing(scene);
+    }
+    expectError("tracing.unbuilt", [&] {
+        Compute list = device.createCompute();
+        list.buildTracing(scene);
+        return device.submit(list);
+    });
+}
+
 TEST_F(TracingTest, BuiltAndTracedInOneList) {
     Mesh moving = createSphere(1.0f, 2);
     const Buffer vertices = input(moving.positions.data(), moving.positions.size() * 12);

@@ -428,6 +428,21 @@ TEST_F(NullDevice, SubmissionsFailOnRequest) {
     EXPECT_THAT(device.flush(), IsOk());
     EXPECT_TRUE(device.check());
 
+    // What the failed submission would have built is not built.
+    Tracing bottom = device.createTracing("bottom");
+    bottom.addVertexBuffer(3, FormatRGBf32, 12, device.createBuffer(Buffer::FlagTracing, 36, "vertices"));
+    ASSERT_THAT(bottom.create(Tracing::TypeTriangle), IsOk());
+    const Tracing top = device.createTracing({Tracing::Instance{.tracing = &bottom}});
+    control->failSubmit(1, ErrorCode::OutOfMemory);
+    device.buildTracing(bottom);
+    EXPECT_THAT(device.flush(), HasErrorId("device.out_of_memory"));
+    expected = "tracing.unbuilt";
+    device.buildTracing(top);
+    EXPECT_THAT(device.flush(), HasErrorId("tracing.unbuilt"));
+    device.buildTracing(bottom);
+    device.buildTracing(top);
+    EXPECT_THAT(device.flush(), IsOk());
+
     expected = "device.lost";
     control->failSubmit(1, ErrorCode::DeviceLost);
     device.clearBuffer(buffer, 3);

@@ -192,12 +192,17 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
             if (transfers && !transfers->isEmpty()) lists_.push_back(&transfers->list());
             if (!lists_.empty() && queue != Queue::Main) {
                 status = play(Queue::Main, where);
+                if (status) transfers->confirmBuilds();
                 lists_.clear();
             }
             if (status) {
                 for (RecorderCore* recorder : recorders)
                     if (!recorder->isEmpty()) lists_.push_back(&recorder->list());
                 if (!lists_.empty()) status = play(queue, where);
+            }
+            if (status) {
+                if (transfers) transfers->confirmBuilds();
+                for (RecorderCore* recorder : recorders) recorder->confirmBuilds();
             }
             if (status && fence) {
                 std::lock_guard fence_lock(fence->mutex);

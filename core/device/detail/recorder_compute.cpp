@@ -14,7 +14,7 @@ constexpr uint64_t inline_limit = 1u << 20;
 }  // namespace
 
 void RecorderCore::setKernel(const Kernel& kernel, Where where) {
-    if (!recording(where)) return;
+    if (!recording(where) || !onQueue(Queue::Compute, "setKernel", where)) return;
     if (kernel.state() == ObjectState::Building) static_cast<KernelObject*>(kernel.object())->waitCreated();
     if (usable(kernel, "setKernel", where)) setProgram(*static_cast<KernelObject*>(kernel.object()));
 }
@@ -178,6 +178,8 @@ void RecorderCore::copyBufferTexture(CommandType type, const Texture& texture, c
     const char* what = upload ? "copyBufferToTexture" : "copyTextureToBuffer";
     if (!recording(where) || !usable(texture, what, where)) return;
     auto* object = static_cast<TextureObject*>(texture.object());
+    // Vulkan: copies of depth and stencil are for queues that can draw.
+    if (formatInfo(object->desc.format).depth && !onQueue(Queue::Main, what, where)) return;
     BufferObject* memory = usableBuffer(buffer, Buffer::FlagNone, what, where);
     if (!memory) return;
     if (object->samples > 1)
@@ -277,6 +279,7 @@ void RecorderCore::clearTexture(const Texture& texture, const Color& color, Slic
     if (!recording(where) || !usable(texture, "clearTexture", where)) return;
     auto* object = static_cast<TextureObject*>(texture.object());
     const FormatInfo& info = formatInfo(object->desc.format);
+    if (!onQueue(info.depth ? Queue::Main : Queue::Compute, "clearTexture", where)) return;
     if (info.compressed)
         return fail(where, ErrorCode::InvalidArgument, "clear.format", "clearTexture: {} has the compressed format {}",
                     object->label(), info.name);
@@ -296,7 +299,8 @@ void RecorderCore::clearTexture(const Texture& texture, const Color& color, Slic
 }
 
 void RecorderCore::createMipmaps(const Texture& texture, Where where) {
-    if (!recording(where) || !usable(texture, "createMipmaps", where)) return;
+    if (!recording(where) || !usable(texture, "createMipmaps", where) || !onQueue(Queue::Main, "createMipmaps", where))
+        return;
     auto* object = static_cast<TextureObject*>(texture.object());
     const FormatInfo& info = formatInfo(object->desc.format);
     if (info.type != FormatType::Float || info.compressed)

@@ -15,7 +15,9 @@ void RecorderDeleter::operator()(RecorderCore* core) const {
 }
 
 void RecorderCore::begin(Queue queue, std::string_view name) {
-    queue_ = queue;
+    // Work for a queue that the adapter lacks goes to the main one, and may be no other work for that.
+    asked_ = queue;
+    queue_ = device_->backend->hasQueue(queue) ? queue : Queue::Main;
     list_.label = name;
     list_.error = {};
     submitted = false;
@@ -35,6 +37,8 @@ void RecorderCore::begin(Queue queue, std::string_view name) {
 }
 
 void RecorderCore::clear() {
+    for (TracingObject* tracing : first_builds_) tracing->built = false;
+    first_builds_.clear();
     for (Object* object : list_.resources) object->unhold();
     list_.resources.clear();
     list_.bytes.clear();
@@ -105,6 +109,14 @@ bool RecorderCore::usable(const Handle& handle, const char* what, Where where) {
         return false;
     }
     return true;
+}
+
+bool RecorderCore::onQueue(Queue last, const char* what, Where where) {
+    if (asked_ <= last) return true;
+    fail(where, ErrorCode::InvalidArgument, "recorder.queue",
+         "{}: the recorder '{}' is for Queue::{}, which cannot do it", what, list_.label,
+         asked_ == Queue::Copy ? "Copy" : "Compute");
+    return false;
 }
 
 BufferObject* RecorderCore::usableBuffer(const Buffer& buffer, Buffer::Flag flag, const char* what, Where where) {
@@ -211,7 +223,12 @@ void RecorderCore::query(CommandType type, const Query& query, Where where) {
                         query.object()->label());
         open_queries_.erase(open);
     }
+    const size_t known = list_.resources.size();
     const uint32_t index = use(*query.object());
+    if (type == CommandType::BeginQuery && list_.resources.size() == known)
+        return fail(where, ErrorCode::InvalidArgument, "query.twice",
+                    "{} has measured a part of this recorder's list already, and keeps one result",
+                    query.object()->label());
     beginAccesses();
     push<QueryCommand>(type).query = index;
 }

@@ -36,6 +36,9 @@ public:
     Status end(Where where);
 
     bool submitted = false;
+    /// The list has been handed to the GPU: the structures that it builds are built. Those of a list that is cleared
+    /// without this count as unbuilt again.
+    void confirmBuilds() { first_builds_.clear(); }
     /// Keeps the device alive while a user holds the recorder; empty while it rests in the pool.
     Ref<DeviceObject> keep;
 
@@ -135,6 +138,8 @@ private:
     }
     /// False, and the error is kept, if the handle is not ready or belongs to another device.
     bool usable(const Handle& handle, const char* what, Where where);
+    /// False, and the error is kept, if the recorder's queue comes after `last` (see Queue).
+    bool onQueue(Queue last, const char* what, Where where);
     BufferObject* usableBuffer(const Buffer& buffer, Buffer::Flag flag, const char* what, Where where);
     bool inRange(const BufferObject& buffer, uint64_t offset, uint64_t size, const char* what, Where where);
     bool resolve(const TextureObject& texture, Slice& slice, const char* what, Where where);
@@ -182,6 +187,7 @@ private:
     bool checkTexture(const ShaderResource& resource, const TextureObject& texture, const Slice& slice) const;
 
     DeviceObject* const device_;
+    Queue asked_ = Queue::Main;
     Queue queue_ = Queue::Main;
     CommandList list_;
     bool ended_ = false;
@@ -220,6 +226,8 @@ private:
     uint32_t dynamic_block_ = none;
     uint32_t region_depth_ = 0;
     std::vector<Query> open_queries_;
+    std::vector<TracingObject*>
+        first_builds_;  ///< what no earlier list has built from the same; the list keeps them alive
 
     // Scratch of one call, kept for its capacity.
     std::vector<const NativeTracing*> natives_;

@@ -88,7 +88,7 @@ void RecorderCore::writeInstances(TracingObject& tracing) {
 void RecorderCore::buildTracing(const Tracing& tracing, const Buffer& scratch, uint64_t offset, bool update,
                                 Where where) {
     const char* what = update ? "updateTracing" : "buildTracing";
-    if (!recording(where) || !usable(tracing, what, where)) return;
+    if (!recording(where) || !usable(tracing, what, where) || !onQueue(Queue::Compute, what, where)) return;
     auto* object = static_cast<TracingObject*>(tracing.object());
     const uint64_t size = update ? object->nativeTracing()->update_size : object->nativeTracing()->build_size;
     if (update && !(object->flags & Tracing::FlagUpdate))
@@ -152,11 +152,13 @@ void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::
             build.instance_count = static_cast<uint32_t>(tracing.instance_data.size());
             access(build.instances, Stage::Build, AccessRead);
         }
+        const bool same =
+            std::equal(tracing.references.begin(), tracing.references.end(), tracing.built_references.begin(),
+                       tracing.built_references.end(),
+                       [](const Ref<TracingObject>& a, const Ref<TracingObject>& b) { return a.get() == b.get(); });
+        if (!same) tracing.built_references = tracing.references;
+        if (!tracing.built || !same) first_builds_.push_back(&tracing);
         tracing.built = true;
-        if (!std::equal(tracing.references.begin(), tracing.references.end(), tracing.built_references.begin(),
-                        tracing.built_references.end(),
-                        [](const Ref<TracingObject>& a, const Ref<TracingObject>& b) { return a.get() == b.get(); }))
-            tracing.built_references = tracing.references;
         builds_.push_back(build);
     }
     const uint32_t place = append(builds_.data(), builds_.size() * sizeof(TracingBuild));

@@ -1,5 +1,5 @@
-// Under AddressSanitizer, libraries stay loaded after dlclose: a leak reported from a driver that has been unloaded has no
-// names left that the suppressions could match.
+// Under AddressSanitizer, libraries stay loaded after dlclose: a leak reported from a driver that has been unloaded has
+// no names left that the suppressions could match.
 #if defined(__SANITIZE_ADDRESS__)
 #define GLINT_KEEP_LOADED 1
 #elif defined(__has_feature)
@@ -9,8 +9,5 @@
 #endif
 
 #ifdef GLINT_KEEP_LOADED
-extern "C" int dlclose(void*) noexcept
-{
-    return 0;
-}
+extern "C" int dlclose(void*) noexcept { return 0; }
 #endif

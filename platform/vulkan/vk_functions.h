@@ -11,54 +11,49 @@
 
 namespace glint::vulkan {
 
+// clang-format off
 #define GLINT_VULKAN_GLOBAL_FUNCTIONS(X) \
-    X(CreateInstance)                    \
-    X(EnumerateInstanceVersion) X(EnumerateInstanceLayerProperties) X(EnumerateInstanceExtensionProperties)
+    X(CreateInstance) X(EnumerateInstanceVersion) X(EnumerateInstanceLayerProperties) \
+    X(EnumerateInstanceExtensionProperties)
 
-#define GLINT_VULKAN_INSTANCE_FUNCTIONS(X)                                                                    \
-    X(DestroyInstance)                                                                                        \
-    X(EnumeratePhysicalDevices)                                                                               \
-    X(EnumerateDeviceExtensionProperties) X(GetDeviceProcAddr) X(CreateDevice) X(GetPhysicalDeviceProperties) \
-        X(GetPhysicalDeviceProperties2) X(GetPhysicalDeviceFeatures2) X(GetPhysicalDeviceFormatProperties)    \
-            X(GetPhysicalDeviceImageFormatProperties2) X(GetPhysicalDeviceMemoryProperties)                   \
-                X(GetPhysicalDeviceQueueFamilyProperties)
+#define GLINT_VULKAN_INSTANCE_FUNCTIONS(X) \
+    X(DestroyInstance) X(EnumeratePhysicalDevices) X(EnumerateDeviceExtensionProperties) \
+    X(GetDeviceProcAddr) X(CreateDevice) X(GetPhysicalDeviceProperties) \
+    X(GetPhysicalDeviceProperties2) X(GetPhysicalDeviceFeatures2) \
+    X(GetPhysicalDeviceFormatProperties) X(GetPhysicalDeviceImageFormatProperties2) \
+    X(GetPhysicalDeviceMemoryProperties) X(GetPhysicalDeviceQueueFamilyProperties)
 
 #define GLINT_VULKAN_DEBUG_FUNCTIONS(X) \
-    X(CreateDebugUtilsMessengerEXT)     \
-    X(DestroyDebugUtilsMessengerEXT)    \
-    X(SetDebugUtilsObjectNameEXT) X(CmdBeginDebugUtilsLabelEXT) X(CmdEndDebugUtilsLabelEXT)
+    X(CreateDebugUtilsMessengerEXT) X(DestroyDebugUtilsMessengerEXT) X(SetDebugUtilsObjectNameEXT) \
+    X(CmdBeginDebugUtilsLabelEXT) X(CmdEndDebugUtilsLabelEXT)
 
-#define GLINT_VULKAN_DEVICE_FUNCTIONS(X)                                                                               \
-    X(DestroyDevice)                                                                                                   \
-    X(DeviceWaitIdle)                                                                                                  \
-    X(GetDeviceQueue) X(QueueSubmit2) X(CreateSemaphore) X(DestroySemaphore) X(GetSemaphoreCounterValue) X(            \
-        WaitSemaphores) X(CreateFence) X(DestroyFence) X(WaitForFences) X(ResetFences) X(CreateCommandPool)            \
-        X(DestroyCommandPool) X(ResetCommandPool) X(AllocateCommandBuffers) X(BeginCommandBuffer) X(EndCommandBuffer)  \
-            X(GetBufferDeviceAddress) X(CreateBufferView) X(DestroyBufferView) X(CreateImageView) X(DestroyImageView)  \
-                X(CreateSampler) X(DestroySampler) X(CreateShaderModule) X(DestroyShaderModule)                        \
-                    X(CreateDescriptorSetLayout) X(DestroyDescriptorSetLayout) X(CreatePipelineLayout)                 \
-                        X(DestroyPipelineLayout) X(CreateDescriptorUpdateTemplate) X(DestroyDescriptorUpdateTemplate)  \
-                            X(UpdateDescriptorSetWithTemplate) X(CreateDescriptorPool) X(DestroyDescriptorPool) X(     \
-                                AllocateDescriptorSets) X(CreateComputePipelines) X(CreateGraphicsPipelines)           \
-                                X(DestroyPipeline) X(CreateQueryPool) X(DestroyQueryPool) X(ResetQueryPool) X(         \
-                                    GetQueryPoolResults) X(CmdPipelineBarrier2) X(CmdBindPipeline)                     \
-                                    X(CmdBindDescriptorSets) X(CmdPushConstants) X(CmdDispatch) X(CmdDispatchIndirect) \
-                                        X(CmdBeginRendering) X(CmdEndRendering) X(CmdSetViewport) X(CmdSetScissor)     \
-                                            X(CmdSetBlendConstants) X(CmdSetStencilReference) X(CmdBindVertexBuffers)  \
-                                                X(CmdBindIndexBuffer) X(CmdDraw) X(CmdDrawIndexed) X(CmdDrawIndirect)  \
-                                                    X(CmdDrawIndexedIndirect) X(CmdCopyBuffer) X(CmdFillBuffer)        \
-                                                        X(CmdCopyBufferToImage) X(CmdCopyImageToBuffer)                \
-                                                            X(CmdCopyImage) X(CmdClearColorImage)                      \
-                                                                X(CmdClearDepthStencilImage) X(CmdBlitImage)           \
-                                                                    X(CmdResetQueryPool) X(CmdBeginQuery)              \
-                                                                        X(CmdEndQuery) X(CmdWriteTimestamp2)
+#define GLINT_VULKAN_DEVICE_FUNCTIONS(X) \
+    X(DestroyDevice) X(DeviceWaitIdle) X(GetDeviceQueue) X(QueueSubmit2) X(CreateSemaphore) \
+    X(DestroySemaphore) X(GetSemaphoreCounterValue) X(WaitSemaphores) X(CreateFence) X(DestroyFence) \
+    X(WaitForFences) X(ResetFences) X(CreateCommandPool) X(DestroyCommandPool) X(ResetCommandPool) \
+    X(AllocateCommandBuffers) X(BeginCommandBuffer) X(EndCommandBuffer) X(GetBufferDeviceAddress) \
+    X(CreateBufferView) X(DestroyBufferView) X(CreateImageView) X(DestroyImageView) X(CreateSampler) \
+    X(DestroySampler) X(CreateShaderModule) X(DestroyShaderModule) X(CreateDescriptorSetLayout) \
+    X(DestroyDescriptorSetLayout) X(CreatePipelineLayout) X(DestroyPipelineLayout) \
+    X(CreateDescriptorUpdateTemplate) X(DestroyDescriptorUpdateTemplate) \
+    X(UpdateDescriptorSetWithTemplate) X(CreateDescriptorPool) X(DestroyDescriptorPool) \
+    X(AllocateDescriptorSets) X(CreateComputePipelines) X(CreateGraphicsPipelines) \
+    X(DestroyPipeline) X(CreateQueryPool) X(DestroyQueryPool) X(ResetQueryPool) \
+    X(GetQueryPoolResults) X(CmdPipelineBarrier2) X(CmdBindPipeline) X(CmdBindDescriptorSets) \
+    X(CmdPushConstants) X(CmdDispatch) X(CmdDispatchIndirect) X(CmdBeginRendering) \
+    X(CmdEndRendering) X(CmdSetViewport) X(CmdSetScissor) X(CmdSetBlendConstants) \
+    X(CmdSetStencilReference) X(CmdBindVertexBuffers) X(CmdBindIndexBuffer) X(CmdDraw) \
+    X(CmdDrawIndexed) X(CmdDrawIndirect) X(CmdDrawIndexedIndirect) X(CmdCopyBuffer) X(CmdFillBuffer) \
+    X(CmdCopyBufferToImage) X(CmdCopyImageToBuffer) X(CmdCopyImage) X(CmdClearColorImage) \
+    X(CmdClearDepthStencilImage) X(CmdBlitImage) X(CmdResetQueryPool) X(CmdBeginQuery) \
+    X(CmdEndQuery) X(CmdWriteTimestamp2)
 
-#define GLINT_VULKAN_TRACING_FUNCTIONS(X)                                                \
-    X(CreateAccelerationStructureKHR)                                                    \
-    X(DestroyAccelerationStructureKHR)                                                   \
+#define GLINT_VULKAN_TRACING_FUNCTIONS(X) \
+    X(CreateAccelerationStructureKHR) X(DestroyAccelerationStructureKHR) \
     X(GetAccelerationStructureBuildSizesKHR) X(GetAccelerationStructureDeviceAddressKHR) \
-        X(CmdBuildAccelerationStructuresKHR) X(CmdCopyAccelerationStructureKHR)          \
-            X(CmdWriteAccelerationStructuresPropertiesKHR)
+    X(CmdBuildAccelerationStructuresKHR) X(CmdCopyAccelerationStructureKHR) \
+    X(CmdWriteAccelerationStructuresPropertiesKHR)
+// clang-format on
 
 #define GLINT_VULKAN_MEMBER(name) PFN_vk##name name = nullptr;
 

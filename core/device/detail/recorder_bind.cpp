@@ -304,13 +304,14 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
     }
     bindings_.uniform_offsets = room(program_->uniform_elements * sizeof(uint32_t), alignof(uint32_t));
     bindings_.uniform_count = program_->uniform_elements;
-    BoundResource* elements = nullptr;
+    std::span<BoundResource> elements;
     uint32_t* offsets = nullptr;
-    if (bindings_.bound != none) elements = reinterpret_cast<BoundResource*>(list_.bytes.data() + bindings_.bound);
+    if (bindings_.bound != none)
+        elements = {reinterpret_cast<BoundResource*>(list_.bytes.data() + bindings_.bound), bindings_.bound_count};
     if (bindings_.uniform_offsets != none)
         offsets = reinterpret_cast<uint32_t*>(list_.bytes.data() + bindings_.uniform_offsets);
     if (bindings_dirty_)
-        for (uint32_t i = 0; i < program_->element_count; i++) elements[i].second = none;
+        for (BoundResource& element : elements) element.second = none;
 
     Bound unset;
     for (size_t k = 0; k < layout.slots.size(); k++) {
@@ -327,7 +328,7 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
                                : e < slots[slot].elements.size() ? slots[slot].elements[e]
                                                                  : unset;
                 if (bindings_dirty_ && !checkBound(resource, kind, slot, bound, what, where)) return false;
-                if (kind == SlotKind::Uniform) offsets[uniform++] = static_cast<uint32_t>(bound.value.offset);
+                if (kind == SlotKind::Uniform && offsets) offsets[uniform++] = static_cast<uint32_t>(bound.value.offset);
                 if (!bindings_dirty_) continue;
                 BoundResource& element = elements[program_->first_element[index] + e];
                 if (kind == SlotKind::Sampler && resource.combined) {

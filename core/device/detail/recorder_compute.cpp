@@ -308,10 +308,11 @@ void RecorderCore::createMipmaps(const Texture& texture, Where where) {
                     "createMipmaps: {} has format {}, which cannot be filtered", object->label(), info.name);
     const uint32_t resource = use(*object);
     const auto layers = static_cast<uint16_t>(object->desc.layers);
-    for (uint16_t mip = 1; mip < object->desc.mipmaps; mip++) {
-        const Slice slice = {mip, 1, 0, layers};
+    for (uint32_t mip = 1; mip < object->desc.mipmaps; mip++) {
+        const Slice from = {static_cast<uint16_t>(mip - 1), 1, 0, layers};
+        const Slice slice = {static_cast<uint16_t>(mip), 1, 0, layers};
         beginAccesses();
-        access(resource, Stage::Copy, AccessRead, Layout::CopySource, {static_cast<uint16_t>(mip - 1), 1, 0, layers});
+        access(resource, Stage::Copy, AccessRead, Layout::CopySource, from);
         access(resource, Stage::Copy, AccessWrite | AccessDiscard, Layout::CopyDestination, slice);
         auto& command = push<BlitMipmapCommand>(CommandType::BlitMipmap);
         command.texture = resource;

@@ -57,7 +57,7 @@ void RecorderCore::clear() {
     target_ = {};
 }
 
-void RecorderCore::fail(Error error) {
+void RecorderCore::fail(const Error& error) {
     if (list_.error) return;
     list_.error = error;
     device_->report(error);

@@ -101,7 +101,7 @@ public:
                       Where where);
 
     /// Keeps the first error and reports it.
-    void fail(Error error);
+    void fail(const Error& error);
     /// False, and the error is kept, if the list takes no more or the handle cannot be used.
     bool check(const Handle& handle, const char* what, Where where) {
         return recording(where) && usable(handle, what, where);

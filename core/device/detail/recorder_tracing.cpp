@@ -48,7 +48,7 @@ void RecorderCore::setInstances(const Tracing& tracing, std::span<const Tracing:
         auto* bottom = instance.tracing ? static_cast<TracingObject*>(instance.tracing->object()) : nullptr;
         bottoms_.push_back(bottom);
         if (!bottom || (!references_.empty() && references_.back() == bottom)) continue;
-        if (instance.tracing->state() != ObjectState::Ready || bottom->device() != device_)
+        if (bottom->state() != ObjectState::Ready || bottom->device() != device_)
             return complain("tracing.instance_failed",
                             fmt::format("refers to {}, which is not usable", bottom->label()));
         if (bottom->tracing_type == Tracing::TypeInstance)

@@ -77,7 +77,7 @@ void Tracker::resolveList(const CommandList& list) {
         };
         forEachAccess(&Tracker::order);
         forEachAccess(&Tracker::record);
-        if (header.type == CommandType::EndTarget) {
+        if (header.type == CommandType::EndTarget && target) {
             in_target_ = false;
             // Attachments are written until here, also by the parts that splits have made.
             const CommandHeader& begin = target->header;

@@ -6,18 +6,46 @@
 #include <glm/geometric.hpp>
 
 #include <cctype>
+#include <cmath>
 
 namespace glint {
 
+namespace {
+
+std::string extension(const std::filesystem::path& path) {
+    std::string text = path.extension().string();
+    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+}
+
+Error unknownExtension(const std::filesystem::path& path, const char* known) {
+    return makeError(ErrorCode::Unsupported, "mesh.unknown_extension", "'{}': meshes end in {}, not in '{}'",
+                     path.string(), known, path.extension().string());
+}
+
+}  // namespace
+
 Expected<Mesh> Mesh::load(const std::filesystem::path& path, uint64_t limit) {
-    std::string extension = path.extension().string();
-    for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    if (extension != ".obj")
-        return unexpected(makeError(ErrorCode::Unsupported, "mesh.unknown_extension",
-                                    "'{}': meshes end in .obj, not in '{}'", path.string(), path.extension().string()));
-    const Expected<std::string> text = readTextFile(path, limit);
-    if (!text) return unexpected(text.error());
-    return parseObj(*text, path.filename().string(), limit);
+    const std::string kind = extension(path);
+    const std::string name = path.filename().string();
+    if (kind == ".obj") {
+        const Expected<std::string> text = readTextFile(path, limit);
+        if (!text) return unexpected(text.error());
+        return parseObj(*text, name, limit);
+    }
+    if (kind == ".ply") {
+        const Expected<std::vector<std::byte>> bytes = readFile(path, limit);
+        if (!bytes) return unexpected(bytes.error());
+        return parsePly(*bytes, name, limit);
+    }
+    return unexpected(unknownExtension(path, ".obj or .ply"));
+}
+
+Status Mesh::save(const std::filesystem::path& path) const {
+    if (extension(path) != ".ply") return unknownExtension(path, ".ply");
+    const Expected<std::vector<std::byte>> bytes = encodePly(*this);
+    if (!bytes) return bytes.error();
+    return writeFile(path, *bytes);
 }
 
 Status Mesh::validate() const {

@@ -5,8 +5,10 @@
 #include <glint/math/bounds.h>
 #include <glint/math/math.h>
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,10 +35,14 @@ struct Mesh {
     std::vector<uint32_t> indices;    ///< three for each triangle
     std::vector<MeshPart> parts;      ///< in the order of their triangles; empty means one part without a name
 
-    /// Reads a file; its ending says which format it has (".obj", see parseObj). Degenerate and repeated triangles are
-    /// kept, and triangles keep the order of the file. Errors: those of readFile, "mesh.unknown_extension" and those of
-    /// the format; they name the file and the line.
+    /// Reads a file; its ending says which format it has (".obj", see parseObj; ".ply", see parsePly). Degenerate and
+    /// repeated triangles are kept, and triangles keep the order of the file. Errors: those of readFile,
+    /// "mesh.unknown_extension" and those of the format; they name the file and the line.
     static Expected<Mesh> load(const std::filesystem::path& path, uint64_t limit = default_limit);
+
+    /// Writes a file, as its ending says (".ply", see encodePly). Errors: those of writeFile, "mesh.unknown_extension"
+    /// and those of the format.
+    Status save(const std::filesystem::path& path) const;
 
     size_t triangleCount() const { return indices.size() / 3; }
 
@@ -74,5 +80,26 @@ struct Mesh {
 /// number is missing or malformed), "mesh.index_range" (an index is malformed, 0 or names nothing that stands above
 /// it), "mesh.not_finite", "mesh.face_corners" (fewer than 3 or more than 1024), "mesh.too_large".
 Expected<Mesh> parseObj(std::string_view text, const std::string& name, uint64_t limit = Mesh::default_limit);
+
+/// Reads a PLY file (ASCII, or binary in either byte order; see parsePlyHeader): of element `vertex` the properties x,
+/// y, z, of any type; nx, ny, nz; and u, v or s, t or texture_u, texture_v or u0, v0. Of the elements `face` and
+/// `tristrips` the list `vertex_indices` or `vertex_index`. All else is passed over.
+///
+/// - Vertices keep their order, also those in no face. There are no parts.
+/// - Polygons are split along existing corners: a quadrilateral along its shorter diagonal, n corners into n - 2
+///   triangles that share the first one. Right for flat convex polygons.
+/// - Triangle strips alternate their orientation, begin with that of their first three corners and end at -1.
+/// - Normals are brought to unit length; one of length zero becomes (0, 0, 1).
+///
+/// `name` names the file in errors; they have the line of a text, or the byte of a binary file, or the vertex. The mesh
+/// may take `limit` bytes, while it is read up to twice that; beside it the reader takes at most 8 bytes for each byte
+/// of the file. Errors: those of parsePlyHeader and PlyReader, "mesh.no_positions", "mesh.no_faces", "mesh.not_finite",
+/// "mesh.index_range", "mesh.face_corners" (fewer than 3), "mesh.too_large".
+Expected<Mesh> parsePly(std::span<const std::byte> file, const std::string& name, uint64_t limit = Mesh::default_limit);
+
+/// Makes a PLY file's bytes: binary, little-endian, float32, texture coordinates as s and t. What parsePly reads from
+/// it differs from `mesh` by its parts, which PLY has no place for, and by the last place of normals that were not of
+/// unit length. Errors: those of validate(), "mesh.too_large" (more than 2^31 - 1 vertices).
+Expected<std::vector<std::byte>> encodePly(const Mesh& mesh);
 
 }  // namespace glint

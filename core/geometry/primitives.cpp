@@ -19,34 +19,54 @@ void addQuad(Mesh& mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
     addTriangle(mesh, a, c, d);
 }
 
+/// On the circle of radius 1 that the tube follows.
+Vector3d torusCenter(uint32_t column, uint32_t columns) {
+    const double around = two_pi * column / columns;
+    return {std::cos(around), std::sin(around), 0.0};
+}
+
+Vector3d torusNormal(uint32_t column, uint32_t columns, uint32_t row, uint32_t rows) {
+    const double across = two_pi * row / rows;
+    return torusCenter(column, columns) * std::cos(across) + Vector3d(0, 0, std::sin(across));
+}
+
 }  // namespace
 
-Mesh createTorus(float ring, float tube, uint32_t ring_segments, uint32_t tube_segments) {
+PolygonMesh createTorusQuads(float ring, float tube, uint32_t ring_segments, uint32_t tube_segments) {
     const uint32_t columns = std::max(ring_segments, 3u);
     const uint32_t rows = std::max(tube_segments, 3u);
-    Mesh mesh;
-    mesh.positions.reserve(size_t{columns} * rows);
-    mesh.normals.reserve(size_t{columns} * rows);
-    mesh.indices.reserve(size_t{columns} * rows * 6);
-    for (uint32_t i = 0; i < columns; i++) {
-        const double around = two_pi * i / columns;
-        for (uint32_t j = 0; j < rows; j++) {
-            const double across = two_pi * j / rows;
-            const Vector3d normal(std::cos(around) * std::cos(across), std::sin(around) * std::cos(across),
-                                  std::sin(across));
-            const Vector3d center(std::cos(around), std::sin(around), 0.0);
-            mesh.positions.emplace_back(center * static_cast<double>(ring) + normal * static_cast<double>(tube));
-            mesh.normals.emplace_back(normal);
-        }
-    }
+    PolygonMesh cage;
+    cage.positions.reserve(size_t{columns} * rows);
+    cage.indices.reserve(size_t{columns} * rows * 4);
+    cage.offsets.reserve(size_t{columns} * rows + 1);
+    cage.offsets.push_back(0);
     for (uint32_t i = 0; i < columns; i++) {
         const uint32_t here = i * rows;
         const uint32_t next = (i + 1) % columns * rows;
         for (uint32_t j = 0; j < rows; j++) {
+            const Vector3d center = torusCenter(i, columns);
+            const Vector3d normal = torusNormal(i, columns, j, rows);
+            cage.positions.emplace_back(center * static_cast<double>(ring) + normal * static_cast<double>(tube));
             const uint32_t k = (j + 1) % rows;
-            addQuad(mesh, here + j, next + j, next + k, here + k);
+            cage.indices.insert(cage.indices.end(), {here + j, next + j, next + k, here + k});
+            cage.offsets.push_back(static_cast<uint32_t>(cage.indices.size()));
         }
     }
+    return cage;
+}
+
+Mesh createTorus(float ring, float tube, uint32_t ring_segments, uint32_t tube_segments) {
+    PolygonMesh cage = createTorusQuads(ring, tube, ring_segments, tube_segments);
+    const uint32_t columns = std::max(ring_segments, 3u);
+    const uint32_t rows = std::max(tube_segments, 3u);
+    Mesh mesh;
+    mesh.positions = std::move(cage.positions);
+    mesh.normals.reserve(mesh.positions.size());
+    for (uint32_t i = 0; i < columns; i++)
+        for (uint32_t j = 0; j < rows; j++) mesh.normals.emplace_back(torusNormal(i, columns, j, rows));
+    mesh.indices.reserve(cage.indices.size() / 4 * 6);
+    for (size_t i = 0; i < cage.indices.size(); i += 4)
+        addQuad(mesh, cage.indices[i], cage.indices[i + 1], cage.indices[i + 2], cage.indices[i + 3]);
     return mesh;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <glint/format/mesh.h>
+#include <glint/geometry/polygon_mesh.h>
 
 namespace glint {
 
@@ -12,6 +13,11 @@ namespace glint {
 /// ring_segments * tube_segments vertices, twice as many triangles, row by row around the ring. Segments are at
 /// least 3.
 Mesh createTorus(float ring, float tube, uint32_t ring_segments, uint32_t tube_segments);
+
+/// The same torus as quadrilaterals, without normals: a cage to refine. The surface that refining leads to is thinner
+/// than the cage. `createTorusQuads(1.07208f, 0.77792f, 16, 11)` has 176 quadrilaterals and reaches from -1.85 to 1.85
+/// along X and Y and from -0.77 to 0.77 along Z.
+PolygonMesh createTorusQuads(float ring, float tube, uint32_t ring_segments, uint32_t tube_segments);
 
 /// An icosahedron whose faces have been split in four `subdivisions` times, with vertices on the sphere:
 /// 20 * 4^subdivisions triangles. At most 10 subdivisions (21 million triangles).

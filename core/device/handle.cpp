@@ -2,6 +2,8 @@
 
 #include <glint/device/detail/object.h>
 
+#include <utility>
+
 namespace glint {
 
 Handle::Handle(const Handle& other) : object_(other.object_) {
@@ -9,9 +11,8 @@ Handle::Handle(const Handle& other) : object_(other.object_) {
 }
 
 Handle& Handle::operator=(const Handle& other) {
-    if (other.object_) other.object_->retain();
-    if (object_) object_->release();
-    object_ = other.object_;
+    Handle copy(other);
+    std::swap(object_, copy.object_);
     return *this;
 }
 

@@ -268,6 +268,10 @@ bool Device::check() const {
     return object && !object->isLost();
 }
 
+void Device::report(const Error& error) const {
+    if (DeviceObject* object = opened(*this); object && error) object->report(error);
+}
+
 Expected<uint64_t> Device::getTime(const Query& query, Where where) {
     const Expected<std::array<uint64_t, 7>> words = queryWords(query, Query::TypeTime, where);
     if (!words) return unexpected(words.error());

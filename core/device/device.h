@@ -202,6 +202,8 @@ public:
     Status finish(Where where = Where::current());
     /// False once the device is lost.
     bool check() const;
+    /// Tells the message callback of an error as of one of the device's own: for what is written on top of it.
+    void report(const Error& error) const;
 
     // Reading back: plays what is queued, then waits for the data.
 

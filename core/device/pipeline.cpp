@@ -266,8 +266,8 @@ void Pipeline::setTexelMask(uint32_t index, Shader::Mask mask, Where where) {
     declareSlots(SlotKind::Texel, index, 1, mask, where);
 }
 
-void Pipeline::addAttribute(Attribute, Format format, uint32_t buffer, uint32_t offset, uint32_t stride, uint32_t rate,
-                            Where where) {
+void Pipeline::addAttribute(Attribute attribute, Format format, uint32_t buffer, uint32_t offset, uint32_t stride,
+                            uint32_t rate, Where where) {
     PipelineObject* pipeline = configurable(object_, where);
     if (!pipeline) return;
     detail::PipelineDesc& desc = pipeline->desc;
@@ -298,6 +298,11 @@ void Pipeline::addAttribute(Attribute, Format format, uint32_t buffer, uint32_t 
                                   slot.stride, slot.rate, stride, rate));
     slot = {.stride = stride, .rate = rate};
     desc.attributes.push_back({.location = location, .format = format, .buffer = buffer, .offset = offset});
+    pipeline->attributes.push_back({attribute, format, buffer, offset, stride, rate});
+}
+
+std::vector<Pipeline::VertexAttribute> Pipeline::getAttributes() const {
+    return object_ ? static_cast<PipelineObject*>(object_)->attributes : std::vector<VertexAttribute>();
 }
 
 void Pipeline::setPrimitive(PrimitiveType primitive, Where where) {

@@ -4,6 +4,8 @@
 #include <glint/device/types.h>
 #include <glint/format/format.h>
 
+#include <vector>
+
 namespace glint {
 
 /// A graphics pipeline. Created by Device::createPipeline, configured, then create().
@@ -79,6 +81,17 @@ public:
         ColorMaskAll = 15,
     };
 
+    /// What one addAttribute says.
+    struct VertexAttribute {
+        Attribute attribute = AttributeCustom;
+        Format format = FormatUnknown;
+        uint32_t buffer = 0;  ///< slot of Command::setVertexBuffer
+        uint32_t offset = 0;  ///< bytes from the beginning of a vertex
+        uint32_t stride = 0;  ///< bytes from vertex to vertex
+        uint32_t rate = 0;    ///< 0 steps by vertex, 1 by instance
+        bool operator==(const VertexAttribute&) const = default;
+    };
+
     Pipeline() = default;
     explicit Pipeline(detail::Object* object) : Program(object) {}
 
@@ -113,6 +126,8 @@ public:
     /// fetched. Errors: "pipeline.attribute".
     void addAttribute(Attribute attribute, Format format, uint32_t buffer, uint32_t offset, uint32_t stride,
                       uint32_t rate = 0, Where where = Where::current());
+    /// The attributes added so far, by location. `attribute` says what a MeshModel puts there.
+    std::vector<VertexAttribute> getAttributes() const;
 
     void setPrimitive(PrimitiveType primitive, Where where = Where::current());
     void setFillMode(FillModeType mode, Where where = Where::current());

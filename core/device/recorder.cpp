@@ -17,6 +17,10 @@ Error Recorder::error() const {
                          {}, 0);
 }
 
+void Recorder::fail(const Error& error) {
+    if (core_ && error) core_->fail(error);
+}
+
 Status Recorder::end() { return core_ ? core_->end(Where::current()) : Status(error()); }
 
 void Recorder::setUniformData(Slot slot, const void* data, uint64_t size) {

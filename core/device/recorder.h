@@ -70,6 +70,8 @@ public:
     /// True while no error has happened.
     explicit operator bool() const { return !error(); }
     Error error() const;
+    /// Fails the list as a wrong call does, unless it has failed already: for what is written on top of recorders.
+    void fail(const Error& error);
     /// Closes the list. Further recording fails with "recorder.ended".
     Status end();
 

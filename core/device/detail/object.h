@@ -5,6 +5,7 @@
 #include <glint/base/error.h>
 #include <glint/device/detail/backend.h>
 #include <glint/device/handle.h>
+#include <glint/device/pipeline.h>
 #include <glint/shader/shader_compiler.h>
 
 #include <array>
@@ -255,6 +256,7 @@ public:
     NativePipeline* nativePipeline() const { return static_cast<NativePipeline*>(native.get()); }
 
     PipelineDesc desc;  ///< blends and layout are completed by create(); stages stay empty
+    std::vector<Pipeline::VertexAttribute> attributes;  ///< as they were added
 
 private:
     Error checkStages(const Stages& stages, Where where) const;

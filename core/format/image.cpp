@@ -96,9 +96,21 @@ std::string extension(const std::filesystem::path& path) {
     return text;
 }
 
-Error unknownExtension(const std::filesystem::path& path) {
-    return makeError(ErrorCode::Unsupported, "image.unknown_extension", "'{}': images end in .png, not in '{}'",
-                     path.string(), path.extension().string());
+struct FileFormat {
+    std::string_view extension;
+    Expected<Image> (*decode)(std::span<const std::byte>, uint64_t limit);
+    Expected<std::vector<std::byte>> (*encode)(const Image&);
+};
+constexpr FileFormat file_formats[] = {
+    {".png", decodePng, encodePng}, {".hdr", decodeHdr, encodeHdr}, {".exr", decodeExr, encodeExr}};
+
+Expected<FileFormat> fileFormat(const std::filesystem::path& path) {
+    const std::string ending = extension(path);
+    for (const FileFormat& format : file_formats)
+        if (format.extension == ending) return format;
+    return unexpected(makeError(ErrorCode::Unsupported, "image.unknown_extension",
+                                "'{}': images end in .png, .hdr or .exr, not in '{}'", path.string(),
+                                path.extension().string()));
 }
 
 }  // namespace
@@ -138,10 +150,11 @@ Expected<Image> Image::create(Format format, uint32_t width, uint32_t height, st
 }
 
 Expected<Image> Image::load(const std::filesystem::path& path, uint64_t limit) {
-    if (extension(path) != ".png") return unexpected(unknownExtension(path));
+    const Expected<FileFormat> format = fileFormat(path);
+    if (!format) return unexpected(format.error());
     Expected<std::vector<std::byte>> bytes = readFile(path, limit);
     if (!bytes) return unexpected(bytes.error());
-    Expected<Image> image = decodePng(*bytes, limit);
+    Expected<Image> image = format->decode(*bytes, limit);
     if (!image)
         return unexpected(Error::inFile(image.error().code(), image.error().id().data(), image.error().message(),
                                         path.filename().string(), 0));
@@ -149,8 +162,9 @@ Expected<Image> Image::load(const std::filesystem::path& path, uint64_t limit) {
 }
 
 Status Image::save(const std::filesystem::path& path) const {
-    if (extension(path) != ".png") return unknownExtension(path);
-    Expected<std::vector<std::byte>> bytes = encodePng(*this);
+    const Expected<FileFormat> format = fileFormat(path);
+    if (!format) return format.error();
+    Expected<std::vector<std::byte>> bytes = format->encode(*this);
     if (!bytes) return bytes.error();
     return writeFile(path, *bytes);
 }

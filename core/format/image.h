@@ -29,12 +29,13 @@ public:
     /// An image of the given texels. Errors: those above and "image.data_size" (not width * height texels).
     static Expected<Image> create(Format format, uint32_t width, uint32_t height, std::span<const std::byte> data);
 
-    /// Reads a file; its ending says which format it has (".png"). `limit` bounds the bytes of the file and of the
-    /// image. Errors: those of readFile, "image.unknown_extension", "image.png_malformed", "image.too_large".
+    /// Reads a file; its ending says which format it has (".png", ".hdr", ".exr"; see decodePng, decodeHdr, decodeExr).
+    /// `limit` bounds the bytes of the file and of the image. Errors: those of readFile, "image.unknown_extension" and
+    /// those of the format, which name the file.
     static Expected<Image> load(const std::filesystem::path& path, uint64_t limit = default_limit);
 
-    /// Writes a file, as its ending says (".png"). Errors: those of writeFile, "image.unknown_extension",
-    /// "image.png_format" (see encodePng), "image.size_zero".
+    /// Writes a file, as its ending says (".png", ".hdr", ".exr"; see encodePng, encodeHdr, encodeExr). Errors: those
+    /// of writeFile, "image.unknown_extension" and those of the format.
     Status save(const std::filesystem::path& path) const;
 
     uint32_t width() const { return width_; }
@@ -83,5 +84,34 @@ Expected<Image> decodePng(std::span<const std::byte> bytes, uint64_t limit = Ima
 /// the sRGB ones are marked so. An image whose alpha is 1 everywhere is written without alpha. Errors:
 /// "image.png_format", "image.size_zero" (an empty image), "image.too_large" (a side of 2^31 or more).
 Expected<std::vector<std::byte>> encodePng(const Image& image);
+
+/// Reads a Radiance HDR file's bytes (RGBE; rows from top to bottom, packed or not) into FormatRGBAf32 with alpha 1.
+/// Values are those stored: EXPOSURE and the like are not applied. A texel (m, e) is m * 2^(e - 136), so its largest
+/// value is 1.7e38. Takes at most `limit` bytes for the image and as much again while it reads. Errors:
+/// "image.hdr_malformed", with the byte; "image.hdr_unsupported" (XYZE, rows in another order, runs of the format's
+/// first years); "image.too_large" (more than `limit`, or than 2 GiB).
+Expected<Image> decodeHdr(std::span<const std::byte> bytes, uint64_t limit = Image::default_limit);
+
+/// Makes a Radiance HDR file's bytes. For FormatRf16 and Rf32 (as gray), RGBf32, RGBAf16 and RGBAf32; alpha is dropped.
+/// RGBE has one exponent for three mantissas of 8 bits, which are rounded to nearest: a channel differs by at most 2/511 of
+/// the largest channel of its texel (half a unit; the largest has 128 of them or more, or 127.75 where it is about to round
+/// up to the next power of two). What RGBE has no place for is changed further: a texel whose largest channel is below
+/// 1e-32 becomes 0, negative values and NaN become 0, infinity and all above 255 * 2^119 = 1.69e38 become that. Errors:
+/// "image.hdr_format", "image.size_zero", "image.too_large" (more than 715827882 texels).
+Expected<std::vector<std::byte>> encodeHdr(const Image& image);
+
+/// Reads an OpenEXR file's bytes: one part, scan lines or tiles (the largest level), any compression, channels of
+/// float16 or float32 that are not subsampled. R, G, B, A give RGBA (absent colours are 0, absent alpha is 1); R, G
+/// without B and A give RG; Y, A give RG; R, Y or a single channel of any name give R; further channels are passed
+/// over. 16 bits if all of them have, else 32. Values are those stored, NaN and infinity included. The image is the
+/// file's data window; where it lies within the display window is dropped. Takes at most `limit` bytes for the image;
+/// beside it OpenEXR takes some times the size of a strip or tile, which itself is kept to `limit` and 16 MiB. Errors:
+/// "image.exr_malformed", "image.exr_unsupported", "image.too_large".
+Expected<Image> decodeExr(std::span<const std::byte> bytes, uint64_t limit = Image::default_limit);
+
+/// Makes an OpenEXR file's bytes: scan lines packed by ZIP, every value as it is, NaN and infinity included. For
+/// FormatRf16 and Rf32 (channel Y), RGf16 and RGf32 (R, G), RGBf32, RGBAf16 and RGBAf32. Errors: "image.exr_format",
+/// "image.size_zero", "image.too_large" (a side of 2^30 or more).
+Expected<std::vector<std::byte>> encodeExr(const Image& image);
 
 }  // namespace glint

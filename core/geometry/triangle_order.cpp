@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <numeric>
 
 namespace glint {
 
@@ -17,12 +18,18 @@ uint32_t spread(uint32_t value) {
 
 struct SortedTriangle {
     uint32_t code;
+    uint32_t number;  ///< before the sort
     std::array<uint32_t, 3> corners;
 };
 
+/// A coordinate of 10 bits; 0 for NaN, which boxes of nearly infinite size give.
+uint32_t cellOf(float place) { return place > 0.0f ? static_cast<uint32_t>(std::min(place, 1023.0f)) : 0; }
+
 }  // namespace
 
-void sortTriangles(Mesh& mesh) {
+std::vector<uint32_t> sortTriangles(Mesh& mesh) {
+    std::vector<uint32_t> order(mesh.triangleCount());
+    std::iota(order.begin(), order.end(), 0u);
     const BoundBox box = mesh.bounds();
     const Vector3f size = glm::max(box.max - box.min, Vector3f(1e-30f));
     const auto sort = [&](size_t first, size_t count) {
@@ -33,18 +40,21 @@ void sortTriangles(Mesh& mesh) {
             const Vector3f& b = mesh.positions[corners[1]];
             const Vector3f& c = mesh.positions[corners[2]];
             const Vector3f centre = (glm::min(a, glm::min(b, c)) + glm::max(a, glm::max(b, c))) * 0.5f;
-            const Vector3f cell = glm::clamp((centre - box.min) / size * 1024.0f, 0.0f, 1023.0f);
-            triangles[i].code = spread(static_cast<uint32_t>(cell.x)) | spread(static_cast<uint32_t>(cell.y)) << 1 |
-                                spread(static_cast<uint32_t>(cell.z)) << 2;
+            const Vector3f cell = (centre - box.min) / size * 1024.0f;
+            triangles[i].code = spread(cellOf(cell.x)) | spread(cellOf(cell.y)) << 1 | spread(cellOf(cell.z)) << 2;
+            triangles[i].number = static_cast<uint32_t>(first / 3 + i);
             std::copy(corners, corners + 3, triangles[i].corners.begin());
         }
         std::stable_sort(triangles.begin(), triangles.end(),
                          [](const SortedTriangle& a, const SortedTriangle& b) { return a.code < b.code; });
-        for (size_t i = 0; i < triangles.size(); i++)
+        for (size_t i = 0; i < triangles.size(); i++) {
             std::copy(triangles[i].corners.begin(), triangles[i].corners.end(), &mesh.indices[first + i * 3]);
+            order[first / 3 + i] = triangles[i].number;
+        }
     };
-    if (mesh.parts.empty()) return sort(0, mesh.indices.size());
+    if (mesh.parts.empty()) sort(0, mesh.indices.size());
     for (const MeshPart& part : mesh.parts) sort(part.first_index, part.index_count);
+    return order;
 }
 
 }  // namespace glint

@@ -199,10 +199,12 @@ Expected<NpyWriter> NpyWriter::create(const std::filesystem::path& path, const N
     state->path = path;
     state->header = header;
     state->temporary = path.string() + fmt::format(".{}.{}.npy.tmp", ::getpid(), counter.fetch_add(1));
+    // A folder would fail the rename at the very end, a device such as /dev/null would be replaced by it.
     std::error_code ignored;
-    // Else the rename at the very end would be the first to fail.
-    errno = EISDIR;
-    if (!std::filesystem::is_directory(path, ignored)) state->file = std::fopen(state->temporary.c_str(), "wb");
+    if (std::filesystem::exists(path, ignored) && !std::filesystem::is_regular_file(path, ignored))
+        return unexpected(
+            makeError(ErrorCode::Io, "file.create", "cannot create '{}': it is no regular file", path.string()));
+    state->file = std::fopen(state->temporary.c_str(), "wb");
     if (!state->file)
         return unexpected(
             makeError(ErrorCode::Io, "file.create", "cannot create '{}': {}", path.string(), std::strerror(errno)));

@@ -334,5 +334,6 @@ TEST(Npy, FilesThatCannotBe) {
     EXPECT_THAT(NpyReader::open(dir.path()), HasErrorId("file.open"));
     EXPECT_THAT(NpyWriter::create(dir / "absent" / "a.npy", structure(1)), HasErrorId("file.create"));
     EXPECT_THAT(NpyWriter::create(dir.path(), structure(1)), HasErrorId("file.create"));
+    EXPECT_THAT(NpyWriter::create("/dev/null", structure(1)), HasErrorId("file.create"));
     EXPECT_THAT(NpyWriter::create(dir / "a.npy", {}), HasErrorId("npy.type"));
 }

@@ -53,6 +53,9 @@ std::string extensionLines(ShaderStage stage, bool with_explicit_types);
 /// Whether types of explicit width other than 64-bit integers (float16_t, u8vec4, ...) occur in the text.
 bool usesExplicitTypes(std::string_view text);
 
+/// SPIR-V's number of a stage.
+uint32_t executionModel(ShaderStage stage);
+
 /// Words in this machine's byte order: SPIR-V may come in either.
 std::vector<uint32_t> nativeWords(std::span<const uint32_t> words);
 

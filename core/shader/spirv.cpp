@@ -70,6 +70,8 @@ uint32_t lineOfInstruction(std::string_view text, uint64_t instruction) {
 
 }  // namespace
 
+uint32_t executionModel(ShaderStage stage) { return static_cast<uint32_t>(modelOf(stage)); }
+
 std::vector<uint32_t> nativeWords(std::span<const uint32_t> words) {
     std::vector<uint32_t> result(words.begin(), words.end());
     if (!result.empty() && result[0] == __builtin_bswap32(spv::MagicNumber))

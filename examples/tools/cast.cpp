@@ -1,0 +1,267 @@
+// glint cast: rays in, hits out, as NumPy arrays of any length.
+
+#include "tool.h"
+
+#include <glint/base/file.h>
+#include <glint/format/npy.h>
+#include <glint/graphics/ray_caster.h>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include <unistd.h>
+
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <memory>
+#include <optional>
+
+using namespace glint;
+
+namespace tool {
+
+namespace {
+
+struct Options {
+    std::filesystem::path mesh;
+    std::filesystem::path rays;
+    std::filesystem::path hits;
+    std::filesystem::path stats;
+    std::string adapter;
+    std::string api;
+    bool any = false;
+};
+
+volatile std::sig_atomic_t interrupted = 0;
+
+/// From here on SIGINT and SIGTERM only say that they came; a second one ends the program as ever.
+void catchSignals() {
+    struct sigaction action = {};
+    action.sa_handler = [](int) { interrupted = 1; };
+    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+    ::sigaction(SIGINT, &action, nullptr);
+    ::sigaction(SIGTERM, &action, nullptr);
+}
+
+Status checkInterrupt() {
+    if (!interrupted) return {};
+    return Error::inFile(ErrorCode::InvalidArgument, "tool.interrupted", "interrupted, nothing is left behind", {}, 0);
+}
+
+double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+/// Adds the time of a scope.
+class Stopwatch {
+public:
+    explicit Stopwatch(double& seconds) : seconds_(seconds), begin_(now()) {}
+    ~Stopwatch() { seconds_ += now() - begin_; }
+    Stopwatch(const Stopwatch&) = delete;
+    Stopwatch& operator=(const Stopwatch&) = delete;
+
+private:
+    double& seconds_;
+    double begin_;
+};
+
+struct Seconds {
+    double load = 0.0, build = 0.0, cast = 0.0, read = 0.0, write = 0.0;
+};
+
+/// A line on stderr that is written over, if a person is looking.
+class Progress {
+public:
+    explicit Progress(uint64_t total) : total_(total), shown_(::isatty(STDERR_FILENO) != 0), begin_(now()) {}
+    ~Progress() {
+        if (drawn_) fmt::print(stderr, "\r\x1b[K");
+    }
+    Progress(const Progress&) = delete;
+    Progress& operator=(const Progress&) = delete;
+
+    void update(uint64_t done) {
+        const double time = now();
+        if (!shown_ || time - last_ < 0.1) return;
+        last_ = time;
+        drawn_ = true;
+        const double share = static_cast<double>(done) / static_cast<double>(total_);
+        const double speed = static_cast<double>(done) / (time - begin_);
+        const auto filled = static_cast<int>(share * 30);
+        fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {:3.0f} %  {:.2f} million rays a second, {:.0f} s left\x1b[K", "",
+                   filled, "", 30 - filled, share * 100, speed * 1e-6, static_cast<double>(total_ - done) / speed);
+        std::fflush(stderr);
+    }
+
+private:
+    uint64_t total_;
+    bool shown_;
+    bool drawn_ = false;
+    double begin_;
+    double last_ = 0.0;
+};
+
+NpyHeader hitHeader(bool any, uint64_t count) {
+    if (any) return {{NpyField::of<bool>()}, {count}};
+    return {{NpyField::of<float>("t"), NpyField::of<uint32_t>("primitive"), NpyField::of<uint32_t>("geometry"),
+             NpyField::of<float>("u"), NpyField::of<float>("v"), NpyField::of<bool>("front"), NpyField::padding(3)},
+            {count}};
+}
+// A hit's `front` is 0 or 1: its first byte is the bool and the others are the padding.
+static_assert(sizeof(RayHit) == 24 && offsetof(RayHit, front) == 20 && std::endian::native == std::endian::little);
+
+Expected<NpyReader> openRays(const std::filesystem::path& path) {
+    Expected<NpyReader> reader = NpyReader::open(path);
+    if (!reader) return reader;
+    const NpyHeader& header = reader->header();
+    const bool is_float = header.fields == std::vector{NpyField::of<float>()};
+    if (!is_float || header.shape.size() != 2 || header.shape[1] != 8)
+        return unexpected(Error::inFile(
+            ErrorCode::InvalidArgument, "tool.rays",
+            fmt::format("rays are float32 [N, 8] (origin, tmin, direction, tmax), not {}", describe(header)),
+            path.string(), 0));
+    return reader;
+}
+
+struct Outcome {
+    uint64_t rays = 0;
+    uint64_t hits = 0;
+    uint64_t triangles = 0;
+    uint64_t tracing_bytes = 0;
+    DeviceInfo info;
+    Seconds seconds;
+};
+
+Status writeStatistics(const Options& options, const Outcome& outcome) {
+    const Seconds& seconds = outcome.seconds;
+    const auto rays = static_cast<double>(outcome.rays);
+    const nlohmann::ordered_json json = {
+        {"mesh", options.mesh.string()},
+        {"triangles", outcome.triangles},
+        {"any", options.any},
+        {"rays", outcome.rays},
+        {"hits", outcome.hits},
+        {"hit_share", outcome.rays ? static_cast<double>(outcome.hits) / rays : 0.0},
+        {"rays_per_second", outcome.rays ? rays / seconds.cast : 0.0},
+        {"seconds",
+         {{"load", seconds.load},
+          {"build", seconds.build},
+          {"cast", seconds.cast},
+          {"read", seconds.read},
+          {"write", seconds.write}}},
+        {"tracing_bytes", outcome.tracing_bytes},
+        {"tracing", "driver"},
+        {"adapter", outcome.info.name},
+        {"driver", outcome.info.driver},
+        {"api", outcome.info.api + " " + outcome.info.version},
+    };
+    return writeTextFile(options.stats,
+                         json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n");
+}
+
+/// Streams all rays through the device into the file of hits.
+Status castAll(const Options& options, RayCaster& caster, NpyReader& reader, Outcome& outcome) {
+    outcome.rays = reader.header().shape[0];
+    Expected<NpyWriter> writer = NpyWriter::create(options.hits, hitHeader(options.any, outcome.rays));
+    if (!writer) return writer.error();
+    Progress progress(outcome.rays);
+    uint64_t done = 0;
+
+    const auto fetch = [&](std::span<Ray> rays) -> Expected<uint64_t> {
+        if (Status status = checkInterrupt(); !status) return unexpected(status.error());
+        const Stopwatch watch(outcome.seconds.read);
+        const Expected<uint64_t> numbers = reader.read(std::as_writable_bytes(rays));
+        return numbers ? *numbers / 8 : numbers;
+    };
+    const auto store = [&](auto hits, auto&& isHit) {
+        const Stopwatch watch(outcome.seconds.write);
+        for (const auto& hit : hits) outcome.hits += isHit(hit);
+        done += hits.size();
+        progress.update(done);
+        return writer->write(std::as_bytes(hits));
+    };
+    const Status status = options.any ? caster.castAny(fetch,
+                                                       [&](std::span<const uint8_t> hits) {
+                                                           return store(hits, [](uint8_t hit) { return hit; });
+                                                       })
+                                      : caster.cast(fetch, [&](std::span<const RayHit> hits) {
+                                            return store(hits, [](const RayHit& hit) { return hit.isHit(); });
+                                        });
+    if (!status) return status;
+    if (Status late = checkInterrupt(); !late) return late;
+    return writer->close();
+}
+
+Expected<Outcome> cast(const Options& options) {
+    Outcome outcome;
+    Expected<NpyReader> reader = openRays(options.rays);
+    if (!reader) return unexpected(reader.error());
+    std::optional<Expected<Mesh>> mesh;
+    {
+        const Stopwatch watch(outcome.seconds.load);
+        mesh = Mesh::load(options.mesh);
+    }
+    if (!*mesh) return unexpected(mesh->error());
+    outcome.triangles = (*mesh)->triangleCount();
+
+    std::optional<Expected<RayCaster>> caster;
+    {
+        const Stopwatch watch(outcome.seconds.build);
+        // What goes wrong is returned, too: one line is enough.
+        const Device device = Device::create({.api = options.api,
+                                              .adapter = options.adapter,
+                                              .required = FeatureComputeTracing,
+                                              .optional = FeatureNone,
+                                              .message = [](const Message&) {}});
+        if (!device) return unexpected(device.error());
+        outcome.info = device.getInfo();
+        caster = RayCaster::create(device, **mesh);
+    }
+    if (!*caster) return unexpected(caster->error());
+    outcome.tracing_bytes = (*caster)->getMemory();
+    mesh.reset();
+    if (Status status = checkInterrupt(); !status) return unexpected(status.error());
+    {
+        const Stopwatch watch(outcome.seconds.cast);
+        if (Status status = castAll(options, **caster, *reader, outcome); !status) return unexpected(status.error());
+    }
+    if (!options.stats.empty())
+        if (Status status = writeStatistics(options, outcome); !status) return unexpected(status.error());
+    return outcome;
+}
+
+int run(const Options& options) {
+    catchSignals();
+    const Expected<Outcome> outcome = cast(options);
+    if (!outcome) {
+        const int status = fail("cast", outcome.error());
+        return outcome.error().id() == "tool.interrupted" ? ExitInterrupted : status;
+    }
+    const Seconds& seconds = outcome->seconds;
+    const auto rays = static_cast<double>(outcome->rays);
+    fmt::print("{} rays, {} hits ({:.2f} %), {} triangles, {}\n", outcome->rays, outcome->hits,
+               outcome->rays ? static_cast<double>(outcome->hits) / rays * 100 : 0.0, outcome->triangles,
+               outcome->info.name);
+    fmt::print(
+        "{:.3f} million rays a second; load {:.2f} s, build {:.2f} s, cast {:.2f} s (read {:.2f} s, write {:.2f} s)\n",
+        outcome->rays ? rays / seconds.cast * 1e-6 : 0.0, seconds.load, seconds.build, seconds.cast, seconds.read,
+        seconds.write);
+    return 0;
+}
+
+}  // namespace
+
+Command castCommand(CLI::App& app) {
+    auto options = std::make_shared<Options>();
+    CLI::App* sub = app.add_subcommand("cast", "Casts rays at a mesh: closest hits, or occlusion");
+    sub->add_option("MESH", options->mesh, "Mesh of triangles (.obj)")->required();
+    sub->add_option("RAYS", options->rays, "Rays: float32 [N, 8] as .npy: origin, tmin, direction, tmax")->required();
+    sub->add_option("HITS", options->hits,
+                    "Where to write the hits: [N] as .npy, of t, primitive, geometry, u, v, front")
+        ->required();
+    sub->add_flag("--any", options->any, "Write whether each ray hits anything: bool [N]");
+    sub->add_option("--stats", options->stats, "Write times and counts to this file")->type_name("FILE.json");
+    sub->add_option("--adapter", options->adapter, "Adapter: its index or a part of its name")->type_name("N|NAME");
+    sub->add_option("--api", options->api, "Graphics API")->type_name("NAME");
+    return {sub, [options] { return run(*options); }};
+}
+
+}  // namespace tool

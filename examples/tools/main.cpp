@@ -1,0 +1,69 @@
+// glint: looks at adapters, compiles and converts shaders, casts rays at meshes. One source for each subcommand.
+
+#include "tool.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdio>
+
+namespace tool {
+
+namespace {
+
+/// Errors that are nobody's wrong input.
+bool isFailure(const glint::Error& error) {
+    switch (error.code()) {
+        case glint::ErrorCode::OutOfMemory:
+        case glint::ErrorCode::DeviceLost:
+        case glint::ErrorCode::ShaderCompile:
+        case glint::ErrorCode::Internal: return true;
+        default: break;
+    }
+    for (const char* group : {"file.", "device.", "shader.", "vulkan."})
+        if (error.id().starts_with(group)) return true;
+    return false;
+}
+
+}  // namespace
+
+int fail(const char* command, const glint::Error& error) {
+    // Whoever calls the program has no use for a line of its sources; of a shader or a mesh, yes.
+    const bool in_sources = error.file().ends_with(".cpp");
+    const std::string text = in_sources ? fmt::format("{} [{}]", error.message(), error.id()) : error.text();
+    fmt::print(stderr, "glint {}: {}\n", command, text);
+    return isFailure(error) ? ExitFailure : ExitUsage;
+}
+
+int failUsage(const char* command, const std::string& text) {
+    fmt::print(stderr, "glint {}: {} ('glint {} --help' tells more) [tool.arguments]\n", command, text, command);
+    return ExitUsage;
+}
+
+}  // namespace tool
+
+int main(int argc, char** argv) {
+    CLI::App app("Looks at adapters, compiles and converts shaders, casts rays at meshes.", "glint");
+    app.set_help_flag("-h,--help", "Print this and end");
+    app.require_subcommand(1);
+    const std::array commands = {tool::infoCommand(app), tool::shaderCommand(app), tool::castCommand(app)};
+    try {
+        app.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+        for (const tool::Command& command : commands) {
+            if (!command.app->parsed()) continue;
+            fmt::print("{}", command.app->help());
+            return 0;
+        }
+        fmt::print("{}", app.help());
+        return 0;
+    } catch (const CLI::ParseError& error) {
+        for (const tool::Command& command : commands)
+            if (command.app->parsed()) return tool::failUsage(command.app->get_name().c_str(), error.what());
+        fmt::print(stderr, "glint: {} ('glint --help' lists the subcommands) [tool.arguments]\n", error.what());
+        return tool::ExitUsage;
+    }
+    for (const tool::Command& command : commands)
+        if (command.app->parsed()) return command.run();
+    return tool::ExitUsage;
+}

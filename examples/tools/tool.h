@@ -1,0 +1,37 @@
+#pragma once
+
+// What the subcommands of `glint` share.
+
+#include <glint/base/error.h>
+
+#include <CLI/CLI.hpp>
+
+#include <functional>
+#include <string>
+
+namespace tool {
+
+/// Exit statuses beside 0.
+enum Exit : int {
+    ExitFailure = 1,       ///< a file, a driver or a compiler failed
+    ExitUsage = 2,         ///< wrong arguments or malformed input
+    ExitInterrupted = 130  ///< by SIGINT or SIGTERM
+};
+
+/// A subcommand: its arguments, and what runs once they are read. Returns the exit status.
+struct Command {
+    CLI::App* app = nullptr;
+    std::function<int()> run;
+};
+
+// One for each source of this folder.
+Command infoCommand(CLI::App& app);
+Command shaderCommand(CLI::App& app);
+Command castCommand(CLI::App& app);
+
+/// Prints "glint cast: what went wrong [id]" on stderr and returns the status that fits.
+int fail(const char* command, const glint::Error& error);
+/// The same for arguments that are wrong, with the id "tool.arguments".
+int failUsage(const char* command, const std::string& text);
+
+}  // namespace tool

@@ -80,6 +80,7 @@ Expected<std::unique_ptr<Backend>> VulkanDevice::adopt(const ForeignDevice& fore
 Status VulkanDevice::createDevice() {
     const float priority = 1.0f;
     std::vector<VkDeviceQueueCreateInfo> queue_infos;
+    queue_infos.reserve(families.size());
     for (uint32_t family : families) {
         VkDeviceQueueCreateInfo info = {VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO};
         info.queueFamilyIndex = family;
@@ -90,6 +91,7 @@ Status VulkanDevice::createDevice() {
     FeatureChain chain = enabled.features;
     chain.link(enabled.extensions);
     std::vector<const char*> extensions;
+    extensions.reserve(enabled.extensions.size());
     for (const std::string& extension : enabled.extensions) extensions.push_back(extension.c_str());
     VkDeviceCreateInfo info = {VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
     info.pNext = &chain.core;

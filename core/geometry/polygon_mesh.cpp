@@ -38,10 +38,11 @@ Status checkAttribute(const PolygonAttribute& attribute, size_t corners) {
 template <size_t Size>
 class Numbering {
 public:
+    explicit Numbering(size_t expected) { numbers_.reserve(expected); }
+
     uint32_t operator()(const std::array<uint32_t, Size>& key) {
         return numbers_.try_emplace(key, static_cast<uint32_t>(numbers_.size())).first->second;
     }
-    size_t size() const { return numbers_.size(); }
 
 private:
     struct KeyHash {
@@ -174,13 +175,13 @@ Expected<PolygonMesh> toPolygons(const Mesh& mesh) {
     PolygonAttribute texcoords{.name = "texcoord", .components = 2, .values = {}, .indices = {}};
 
     std::vector<uint32_t> welded(mesh.positions.size());
-    Numbering<3> places;
+    Numbering<3> places(mesh.positions.size());
     for (size_t i = 0; i < welded.size(); i++) {
         const Vector3f& p = mesh.positions[i];
         welded[i] = places({bitsOf(p.x), bitsOf(p.y), bitsOf(p.z)});
         if (welded[i] == polygons.positions.size()) polygons.positions.push_back(p);
     }
-    Numbering<3> values;
+    Numbering<3> values(mesh.texcoords.size());
     for (size_t i = 0; i < mesh.indices.size(); i += 3) {
         const std::array<uint32_t, 3> corners = {welded[mesh.indices[i]], welded[mesh.indices[i + 1]],
                                                  welded[mesh.indices[i + 2]]};

@@ -20,10 +20,6 @@ namespace {
 
 // Vertices of the next step: those of this one, one for each edge, and in Catmull-Clark's scheme one for each face.
 
-void addTo(double* sum, const double* values, double weight, uint32_t count) {
-    for (uint32_t i = 0; i < count; i++) sum[i] += weight * values[i];
-}
-
 std::vector<VertexRule> vertexRules(const Topology& topology, Subdivision scheme) {
     struct Edges {
         uint32_t all = 0, sharp = 0, staying = 0;  // staying: sharp in the next step too
@@ -276,6 +272,7 @@ Status checkSize(const Surface& surface, Subdivision scheme, uint32_t steps, uin
     uint64_t corners = surface.topology.cornerCount(), faces = surface.topology.faceCount();
     uint64_t edges = surface.topology.edgeCount();
     std::vector<uint64_t> values;
+    values.reserve(surface.channels.size());
     for (const Channel& channel : surface.channels) values.push_back(channel.count());
     for (uint32_t step = 0;; step++) {
         uint64_t bytes = (corners + faces) * sizeof(uint32_t);

@@ -35,4 +35,20 @@ enum class Subdivision : uint8_t {
 Expected<PolygonMesh> refine(const PolygonMesh& cage, Subdivision scheme, uint32_t steps,
                              uint64_t limit = Mesh::default_limit);
 
+/// Refines a cage `steps` times and moves each vertex to the place where refining for ever would bring it. The
+/// attribute "normal" has the limit surface's unit normals: one value for each vertex, or, on creases and at corners,
+/// for each sector between sharp edges. Vertices in no face have none.
+///
+/// Not everywhere has the limit a tangent plane. At a corner (more than two sharp edges, or one face at the boundary)
+/// the normal is that of the plane of the sector's two sharp edges. On a crease or boundary whose sector has more than
+/// 3 faces (Catmull-Clark) or 5 (Loop) it is that of the plane of the crease's tangent and of the direction that
+/// shrinks slowest inside the sector (Biermann, Levin and Zorin 2000 change the rules there; DeRose's are kept here).
+/// Where tangents vanish it is the mean of the faces' normals, weighted by area, and (0, 0, 1) if that vanishes too.
+///
+/// Formulas: Halstead, Kass and DeRose 1993 for Catmull-Clark, Loop 1987 for triangles; at boundaries and creases
+/// eigenvectors of the same rules. Errors: those of refine; "refine.crease_left" (an edge is semi-sharp still after
+/// `steps`: refine further).
+Expected<PolygonMesh> toLimit(const PolygonMesh& cage, Subdivision scheme, uint32_t steps = 0,
+                              uint64_t limit = Mesh::default_limit);
+
 }  // namespace glint

@@ -35,6 +35,17 @@ struct Topology {
     uint32_t twin(uint32_t half) const { return halves[edges[half]][1 - isSecond(half)]; }
 };
 
+/// Adds `count` weighted numbers.
+inline void addTo(double* sum, const double* values, double weight, uint32_t count) {
+    if (count == 3) {  // positions: twice as fast as the loop
+        sum[0] += weight * values[0];
+        sum[1] += weight * values[1];
+        sum[2] += weight * values[2];
+        return;
+    }
+    for (uint32_t i = 0; i < count; i++) sum[i] += weight * values[i];
+}
+
 /// Numbers at the corners of faces: positions, or an attribute.
 struct Channel {
     uint32_t components = 0;

@@ -17,6 +17,7 @@
 #include <glint/device/texture.h>
 #include <glint/device/tracing.h>
 #include <glint/device/types.h>
+#include <glint/device/window.h>
 
 #include <array>
 #include <functional>
@@ -122,6 +123,10 @@ public:
     Target createTarget(const Texture& color, const Texture& depth = {}, Where where = Where::current());
     Query createQuery(Query::Type type, std::string_view name = {}, Where where = Where::current());
     Fence createFence(std::string_view name = {}, Where where = Where::current());
+    /// Opens a window. Nothing before this call touches the window system. Errors: "window.no_display" (there is none
+    /// to open it on), "window.create" (the system refuses), "window.unsupported" (the adapter cannot present to it, or
+    /// the device was made without FeaturePresent), "window.size", "window.format", "window.thread".
+    Window createWindow(const WindowDesc& desc = {}, Where where = Where::current());
 
     /// A structure to configure. Errors of the short forms as of Tracing::create.
     Tracing createTracing(std::string_view name = {}, Where where = Where::current());

@@ -1,6 +1,7 @@
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
 #include <glint/device/detail/texture_layout.h>
+#include <glint/device/detail/window_object.h>
 #include <glint/device/device.h>
 
 #include <algorithm>
@@ -205,6 +206,26 @@ Query Device::createQuery(Query::Type type, std::string_view name, Where where) 
                    "it needs the feature {}, which {} lacks", toString(feature), getInfo().name);
     if (!creation.failed()) creation.finish(creation.device()->backend->createQuery(type));
     return Query(creation.object());
+}
+
+Window Device::createWindow(const WindowDesc& desc, Where where) {
+    Creation<detail::WindowObject> creation(*this, desc.title, where, desc);
+    const uint32_t limit = getFeatures().maxTexture2DSize;
+    creation.check(getFeatures().has(FeaturePresent), ErrorCode::Unsupported, "window.unsupported",
+                   "it needs the feature {}, which {} was opened without", toString(FeaturePresent), getInfo().name);
+    creation.check(desc.width && desc.height && std::max(desc.width, desc.height) <= limit, ErrorCode::OutOfRange,
+                   "window.size", "{}x{} pixels; each is 1 to {}", desc.width, desc.height, limit);
+    creation.check(desc.depth == FormatUnknown || (desc.depth < FormatCount && formatInfo(desc.depth).depth),
+                   ErrorCode::InvalidArgument, "window.format", "format {} is no depth format",
+                   desc.depth < FormatCount ? toString(desc.depth) : "?");
+    creation.check(desc.depth == FormatUnknown || hasTexture(desc.depth, Texture::FlagTarget), ErrorCode::Unsupported,
+                   "window.format", "{} cannot draw to depth format {}", getInfo().name,
+                   desc.depth < FormatCount ? toString(desc.depth) : "?");
+    if (!creation.failed()) {
+        creation.finish(creation.device()->backend->createWindow(desc));
+        if (!creation.failed()) creation.object()->open(where);
+    }
+    return Window(creation.object());
 }
 
 }  // namespace glint

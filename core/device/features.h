@@ -32,7 +32,8 @@ enum Feature : uint64_t {
     FeatureSamplerReduction = 1ull << 21,  ///< minimum and maximum filters
     FeatureStatistics = 1ull << 22,        ///< pipeline statistics queries
     FeatureTimestamps = 1ull << 23,        ///< time queries
-    FeatureCount = 24,
+    FeaturePresent = 1ull << 24,           ///< windows
+    FeatureCount = 25,
 };
 using FeatureMask = uint64_t;
 constexpr FeatureMask FeatureNone = 0;

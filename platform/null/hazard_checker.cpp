@@ -115,6 +115,7 @@ const char* toString(CommandType type) {
         case CommandType::PushRegion: return "begin of region";
         case CommandType::PopRegion: return "end of region";
         case CommandType::HostRead: return "read by the CPU";
+        case CommandType::Present: return "presentation";
         case CommandType::Barrier: return "barrier";
         case CommandType::Count: break;
     }

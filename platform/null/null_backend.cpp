@@ -3,6 +3,7 @@
 #include <platform/null/null_access.h>
 #include <platform/null/null_objects.h>
 #include <platform/null/null_player.h>
+#include <platform/null/null_window.h>
 
 #include <glint/base/format_error.h>
 #include <glint/device/detail/object.h>
@@ -155,6 +156,10 @@ public:
         auto made = create<NullQuery>(0, control_, 0, "query");
         if (made) (*made)->type = type;
         return made;
+    }
+
+    Expected<std::unique_ptr<NativeWindow>> createWindow(const WindowDesc& desc) override {
+        return create<NullWindow>(0, control_, desc);
     }
 
     uint32_t instanceSize() const override { return sizeof(InstanceRecord); }

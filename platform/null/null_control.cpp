@@ -108,6 +108,44 @@ void NullControl::release(Queue queue, uint64_t value) {
     progress();
 }
 
+void NullControl::setWindowEvents(const WindowEvents& events) {
+    std::lock_guard lock(mutex_);
+    window_events_ = events;
+}
+
+void NullControl::outdateWindow() {
+    std::lock_guard lock(mutex_);
+    window_outdated_ = true;
+}
+
+void NullControl::loseWindow() {
+    std::lock_guard lock(mutex_);
+    window_lost_ = true;
+}
+
+WindowEvents NullControl::takeWindowEvents(const WindowEvents& before) {
+    std::lock_guard lock(mutex_);
+    const WindowEvents events = window_events_.value_or(before);
+    if (window_events_) {
+        window_events_->close = false;
+        window_events_->pressed_buttons.reset();
+        window_events_->pressed_keys.reset();
+        window_events_->wheel = {0, 0};
+        window_events_->text.clear();
+    }
+    return events;
+}
+
+bool NullControl::takeOutdated() {
+    std::lock_guard lock(mutex_);
+    return std::exchange(window_outdated_, false);
+}
+
+bool NullControl::isWindowLost() const {
+    std::lock_guard lock(mutex_);
+    return window_lost_;
+}
+
 void NullControl::setObserver(Observer observer) {
     std::lock_guard lock(mutex_);
     observer_ = std::move(observer);

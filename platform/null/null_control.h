@@ -15,6 +15,7 @@
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -88,6 +89,13 @@ public:
     /// Completes the held submissions up to this value.
     void release(Queue queue, uint64_t value);
 
+    /// What the windows of the device see next and, but for what a user does once, from then on.
+    void setWindowEvents(const detail::WindowEvents& events);
+    /// The next acquired, or presented, picture of a window turns out to be outdated.
+    void outdateWindow();
+    /// The window system takes the device's windows away: acquiring and presenting fail with "window.lost".
+    void loseWindow();
+
     /// Called with each submission and the checker before it judges it. Must not call this object.
     using Observer = std::function<void(const detail::Submission&, const HazardChecker&)>;
     void setObserver(Observer observer);
@@ -115,6 +123,10 @@ public:
 
     void open(std::function<void(const Error&, bool warning)> message);
     void close();
+
+    detail::WindowEvents takeWindowEvents(const detail::WindowEvents& before);
+    bool takeOutdated();
+    bool isWindowLost() const;
 
 private:
     struct Pending {
@@ -145,6 +157,9 @@ private:
     uint64_t ids_ = 0;
     bool lost_ = false;
     bool open_ = false;
+    std::optional<detail::WindowEvents> window_events_;
+    bool window_outdated_ = false;
+    bool window_lost_ = false;
     std::function<void(const Error&, bool warning)> message_;
     Observer observer_;
     HazardChecker checker_;

@@ -130,6 +130,7 @@ void NullPlayer::play(const CommandHeader& header) {
         case CommandType::PushRegion:
         case CommandType::PopRegion:
         case CommandType::HostRead:
+        case CommandType::Present:
         case CommandType::Barrier:
         case CommandType::Count: break;
     }

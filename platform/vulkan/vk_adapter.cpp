@@ -18,13 +18,14 @@ constexpr const char* known_extensions[] = {
     VK_KHR_RAY_QUERY_EXTENSION_NAME,
     VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME,
     VK_EXT_MESH_SHADER_EXTENSION_NAME,
+    VK_KHR_SWAPCHAIN_EXTENSION_NAME,
 };
 
 bool contains(const std::vector<std::string>& names, const char* name) {
     return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-FeatureMask offeredFeatures(const Adapter& adapter) {
+FeatureMask offeredFeatures(const Instance& instance, const Adapter& adapter) {
     const FeatureChain& chain = adapter.offered;
     const VkPhysicalDeviceFeatures& core = chain.core.features;
     const bool structures = chain.structures.accelerationStructure && chain.v12.bufferDeviceAddress;
@@ -57,6 +58,7 @@ FeatureMask offeredFeatures(const Adapter& adapter) {
     add(FeatureSamplerReduction, chain.v12.samplerFilterMinmax);
     add(FeatureStatistics, core.pipelineStatisticsQuery);
     add(FeatureTimestamps, adapter.timestamp_bits[0] != 0 && adapter.properties.limits.timestampPeriod > 0.0f);
+    add(FeaturePresent, instance.surfaces && adapter.has(VK_KHR_SWAPCHAIN_EXTENSION_NAME));
     return mask;
 }
 
@@ -164,7 +166,7 @@ Adapter describeAdapter(const Instance& instance, VkPhysicalDevice handle, uint3
         if (adapter.families[i] != no_family)
             adapter.timestamp_bits[i] = families[adapter.families[i]].timestampValidBits;
     }
-    info.features = offeredFeatures(adapter);
+    info.features = offeredFeatures(instance, adapter);
 
     const auto need = [&adapter](bool there, const char* name) {
         if (!there) adapter.lacking += (adapter.lacking.empty() ? "" : ", ") + std::string(name);
@@ -339,6 +341,7 @@ Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
         features.mesh.taskShader = VK_TRUE;
         enabled.extensions.push_back(VK_EXT_MESH_SHADER_EXTENSION_NAME);
     }
+    if (mask & FeaturePresent) enabled.extensions.push_back(VK_KHR_SWAPCHAIN_EXTENSION_NAME);
     return enabled;
 }
 

@@ -9,6 +9,7 @@
 #include "platform/vulkan/vk_sampler.h"
 #include "platform/vulkan/vk_texture.h"
 #include "platform/vulkan/vk_tracing.h"
+#include "platform/vulkan/vk_window.h"
 #include "platform/vulkan/vulkan.h"
 
 #include <glint/base/format_error.h>
@@ -169,6 +170,20 @@ Expected<std::unique_ptr<NativeQuery>> VulkanDevice::createQuery(Query::Type typ
     return VulkanQuery::create(*this, type);
 }
 
+Expected<std::unique_ptr<NativeWindow>> VulkanDevice::createWindow(const WindowDesc& desc) {
+    return VulkanWindow::create(*this, desc);
+}
+
+VkResult VulkanDevice::present(const VkPresentInfoKHR& info) {
+    const std::lock_guard lock(submit_mutex_);
+    return vk.QueuePresentKHR(queue(Queue::Main).handle(), &info);
+}
+
+void VulkanDevice::waitPresented() {
+    const std::lock_guard lock(submit_mutex_);
+    vk.QueueWaitIdle(queue(Queue::Main).handle());
+}
+
 uint32_t VulkanDevice::instanceSize() const { return instance_size; }
 
 void VulkanDevice::writeInstances(std::span<const Tracing::Instance> instances,
@@ -198,7 +213,16 @@ Status VulkanDevice::submit(const Submission& submission) {
             // The layer sees no order in time lines, but in fences: without this, every wait is a race to it.
             if (instance->validation) queue(point.queue).settle(point.value);
         }
-        status = queues_[static_cast<size_t>(submission.queue)]->submit(submission, waits_);
+        for (NativeWindow* window : submission.acquired) {
+            VkSemaphoreSubmitInfo info = {VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO};
+            info.semaphore = static_cast<VulkanWindow*>(window)->acquired();
+            info.stageMask = picture_stages;
+            waits_.push_back(info);
+        }
+        auto* const presented = static_cast<VulkanWindow*>(submission.presented);
+        status = queues_[static_cast<size_t>(submission.queue)]->submit(
+            submission, waits_, presented ? presented->drawn() : VK_NULL_HANDLE);
+        if (status && presented) presented->noteSubmission(submission.value);
     }
     if (!status && status.error().code() == ErrorCode::DeviceLost) return lost("vkQueueSubmit2");
     return status;

@@ -60,6 +60,7 @@ public:
     Expected<std::unique_ptr<detail::NativePipeline>> createPipeline(const detail::PipelineDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeTracing>> createTracing(const detail::NativeTracingDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeQuery>> createQuery(Query::Type type) override;
+    Expected<std::unique_ptr<detail::NativeWindow>> createWindow(const WindowDesc& desc) override;
 
     uint32_t instanceSize() const override;
     void writeInstances(std::span<const Tracing::Instance> instances,
@@ -74,6 +75,11 @@ public:
 
     /// The error of a lost device, with what is known of its queues.
     Error lost(const char* call) const;
+
+    /// vkQueuePresentKHR, and a wait for all that it and submissions were asked for, on the main queue, which
+    /// submissions of other threads have to stay away from.
+    VkResult present(const VkPresentInfoKHR& info);
+    void waitPresented();
 
     /// Debug name, where the instance takes them.
     template <class T>

@@ -25,6 +25,7 @@ void InstanceFunctions::load(PFN_vkGetInstanceProcAddr get, VkInstance instance)
     GetInstanceProcAddr = get;
 #define GLINT_VULKAN_LOAD(name) name = reinterpret_cast<PFN_vk##name>(get(instance, "vk" #name));
     GLINT_VULKAN_INSTANCE_FUNCTIONS(GLINT_VULKAN_LOAD)
+    GLINT_VULKAN_SURFACE_FUNCTIONS(GLINT_VULKAN_LOAD)
     GLINT_VULKAN_DEBUG_FUNCTIONS(GLINT_VULKAN_LOAD)
 #undef GLINT_VULKAN_LOAD
 }
@@ -32,6 +33,7 @@ void InstanceFunctions::load(PFN_vkGetInstanceProcAddr get, VkInstance instance)
 void DeviceFunctions::load(PFN_vkGetDeviceProcAddr get, VkDevice device) {
 #define GLINT_VULKAN_LOAD(name) name = reinterpret_cast<PFN_vk##name>(get(device, "vk" #name));
     GLINT_VULKAN_DEVICE_FUNCTIONS(GLINT_VULKAN_LOAD)
+    GLINT_VULKAN_SWAPCHAIN_FUNCTIONS(GLINT_VULKAN_LOAD)
     GLINT_VULKAN_TRACING_FUNCTIONS(GLINT_VULKAN_LOAD)
 #undef GLINT_VULKAN_LOAD
 }

@@ -23,12 +23,17 @@ namespace glint::vulkan {
     X(GetPhysicalDeviceFormatProperties) X(GetPhysicalDeviceImageFormatProperties2) \
     X(GetPhysicalDeviceMemoryProperties) X(GetPhysicalDeviceQueueFamilyProperties)
 
+#define GLINT_VULKAN_SURFACE_FUNCTIONS(X) \
+    X(DestroySurfaceKHR) X(GetPhysicalDeviceSurfaceSupportKHR) \
+    X(GetPhysicalDeviceSurfaceCapabilitiesKHR) X(GetPhysicalDeviceSurfaceFormatsKHR) \
+    X(GetPhysicalDeviceSurfacePresentModesKHR)
+
 #define GLINT_VULKAN_DEBUG_FUNCTIONS(X) \
     X(CreateDebugUtilsMessengerEXT) X(DestroyDebugUtilsMessengerEXT) X(SetDebugUtilsObjectNameEXT) \
     X(CmdBeginDebugUtilsLabelEXT) X(CmdEndDebugUtilsLabelEXT)
 
 #define GLINT_VULKAN_DEVICE_FUNCTIONS(X) \
-    X(DestroyDevice) X(DeviceWaitIdle) X(GetDeviceQueue) X(QueueSubmit2) X(CreateSemaphore) \
+    X(DestroyDevice) X(DeviceWaitIdle) X(GetDeviceQueue) X(QueueSubmit2) X(QueueWaitIdle) X(CreateSemaphore) \
     X(DestroySemaphore) X(GetSemaphoreCounterValue) X(WaitSemaphores) X(CreateFence) X(DestroyFence) \
     X(WaitForFences) X(ResetFences) X(CreateCommandPool) X(DestroyCommandPool) X(ResetCommandPool) \
     X(AllocateCommandBuffers) X(BeginCommandBuffer) X(EndCommandBuffer) X(GetBufferDeviceAddress) \
@@ -48,6 +53,10 @@ namespace glint::vulkan {
     X(CmdClearDepthStencilImage) X(CmdBlitImage) X(CmdResetQueryPool) X(CmdBeginQuery) \
     X(CmdEndQuery) X(CmdWriteTimestamp2)
 
+#define GLINT_VULKAN_SWAPCHAIN_FUNCTIONS(X) \
+    X(CreateSwapchainKHR) X(DestroySwapchainKHR) X(GetSwapchainImagesKHR) X(AcquireNextImageKHR) \
+    X(QueuePresentKHR)
+
 #define GLINT_VULKAN_TRACING_FUNCTIONS(X) \
     X(CreateAccelerationStructureKHR) X(DestroyAccelerationStructureKHR) \
     X(GetAccelerationStructureBuildSizesKHR) X(GetAccelerationStructureDeviceAddressKHR) \
@@ -66,18 +75,22 @@ struct LoaderFunctions {
 /// Opens the Vulkan loader once for the whole process; nullptr if this machine has none.
 const LoaderFunctions* loaderFunctions();
 
-/// Functions of one instance. Those of VK_EXT_debug_utils are nullptr where the instance does not enable it.
+/// Functions of one instance. Those of VK_EXT_debug_utils and of surfaces are nullptr where the instance does not
+/// enable them.
 struct InstanceFunctions {
     PFN_vkGetInstanceProcAddr GetInstanceProcAddr = nullptr;
     GLINT_VULKAN_INSTANCE_FUNCTIONS(GLINT_VULKAN_MEMBER)
+    GLINT_VULKAN_SURFACE_FUNCTIONS(GLINT_VULKAN_MEMBER)
     GLINT_VULKAN_DEBUG_FUNCTIONS(GLINT_VULKAN_MEMBER)
 
     void load(PFN_vkGetInstanceProcAddr get, VkInstance instance);
 };
 
-/// Functions of one device. Those of acceleration structures are nullptr where the device does not enable them.
+/// Functions of one device. Those of swapchains and acceleration structures are nullptr where the device does not
+/// enable them.
 struct DeviceFunctions {
     GLINT_VULKAN_DEVICE_FUNCTIONS(GLINT_VULKAN_MEMBER)
+    GLINT_VULKAN_SWAPCHAIN_FUNCTIONS(GLINT_VULKAN_MEMBER)
     GLINT_VULKAN_TRACING_FUNCTIONS(GLINT_VULKAN_MEMBER)
 
     void load(PFN_vkGetDeviceProcAddr get, VkDevice device);

@@ -27,17 +27,27 @@ bool hasLayer(const LoaderFunctions& vk, const char* name) {
     return false;
 }
 
-bool hasExtension(const LoaderFunctions& vk, const char* layer, const char* name) {
+std::vector<VkExtensionProperties> listExtensions(const LoaderFunctions& vk, const char* layer) {
     uint32_t count = 0;
     vk.EnumerateInstanceExtensionProperties(layer, &count, nullptr);
     std::vector<VkExtensionProperties> extensions(count);
     vk.EnumerateInstanceExtensionProperties(layer, &count, extensions.data());
     extensions.resize(count);
+    return extensions;
+}
+
+bool contains(const std::vector<VkExtensionProperties>& extensions, const char* name) {
     for (const VkExtensionProperties& extension : extensions) {
         if (!std::strcmp(extension.extensionName, name)) return true;
     }
     return false;
 }
+
+/// Surfaces of every window system, by name: their headers include the system's own.
+constexpr const char* surface_extensions[] = {
+    "VK_KHR_xcb_surface",   "VK_KHR_xlib_surface",  "VK_KHR_wayland_surface",
+    "VK_KHR_win32_surface", "VK_EXT_metal_surface",
+};
 
 Error messageError(const VkDebugUtilsMessengerCallbackDataEXT& data) {
     return Error::inFile(ErrorCode::Internal, "vulkan.validation", data.pMessage ? data.pMessage : "", {}, 0,
@@ -95,10 +105,20 @@ Expected<std::shared_ptr<Instance>> Instance::shared(bool validation) {
     std::shared_ptr<Instance> instance(new Instance);
     instance->owned = true;
     instance->validation = validation && hasLayer(*loader, validation_layer);
-    instance->debug_utils = hasExtension(*loader, nullptr, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+    const std::vector<VkExtensionProperties> offered = listExtensions(*loader, nullptr);
+    instance->debug_utils = contains(offered, VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
 
     std::vector<const char*> layers, extensions;
     if (instance->debug_utils) extensions.push_back(VK_EXT_DEBUG_UTILS_EXTENSION_NAME);
+    // Enabled whether there is a display or not: it costs nothing, and any device can then have a window later.
+    if (contains(offered, VK_KHR_SURFACE_EXTENSION_NAME)) {
+        extensions.push_back(VK_KHR_SURFACE_EXTENSION_NAME);
+        for (const char* extension : surface_extensions) {
+            if (!contains(offered, extension)) continue;
+            extensions.push_back(extension);
+            instance->surfaces = true;
+        }
+    }
     VkDebugUtilsMessengerCreateInfoEXT messenger = messengerInfo(sendToLog, nullptr);
     VkValidationFeaturesEXT features = {VK_STRUCTURE_TYPE_VALIDATION_FEATURES_EXT};
     const VkValidationFeatureEnableEXT enables[] = {VK_VALIDATION_FEATURE_ENABLE_SYNCHRONIZATION_VALIDATION_EXT};
@@ -110,7 +130,7 @@ Expected<std::shared_ptr<Instance>> Instance::shared(bool validation) {
         // Hazards between submissions. Layers of 1.3.239 can be asked for it by the environment alone, later ones do it
         // by default. What the user has set there stays.
         setenv("VK_LAYER_ENABLES", "VALIDATION_CHECK_ENABLE_SYNCHRONIZATION_VALIDATION_QUEUE_SUBMIT", 0);
-        if (hasExtension(*loader, validation_layer, VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME)) {
+        if (contains(listExtensions(*loader, validation_layer), VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME)) {
             extensions.push_back(VK_EXT_VALIDATION_FEATURES_EXTENSION_NAME);
             next = &features;
         }

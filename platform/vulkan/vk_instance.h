@@ -29,6 +29,7 @@ public:
     VkInstance handle = VK_NULL_HANDLE;
     InstanceFunctions vk;
     bool debug_utils = false;  ///< names, regions and messages
+    bool surfaces = false;     ///< of the window systems that drivers here know: devices may present
     bool validation = false;   ///< the Khronos layer is there, or may be
     bool owned = false;
 

@@ -167,6 +167,7 @@ void Player::playCommand(const CommandHeader& header) {
         case CommandType::PushRegion: return pushRegion(list_->at<char>(as<RegionCommand>(header).name));
         case CommandType::PopRegion: return popRegion();
         case CommandType::HostRead:
+        case CommandType::Present:
         case CommandType::Barrier:  // the tracker has placed their barriers
         case CommandType::Count: return;
     }

@@ -109,7 +109,8 @@ void VulkanQueue::recycleCompleted() {
     pending_.erase(pending_.begin(), pending_.begin() + static_cast<std::ptrdiff_t>(done));
 }
 
-Status VulkanQueue::submit(const detail::Submission& submission, std::span<const VkSemaphoreSubmitInfo> waits) {
+Status VulkanQueue::submit(const detail::Submission& submission, std::span<const VkSemaphoreSubmitInfo> waits,
+                           VkSemaphore signal) {
     recycleCompleted();
     Expected<std::unique_ptr<Frame>> acquired = acquire();
     if (!acquired) return acquired.error();
@@ -122,17 +123,19 @@ Status VulkanQueue::submit(const detail::Submission& submission, std::span<const
 
     VkCommandBufferSubmitInfo commands = {VK_STRUCTURE_TYPE_COMMAND_BUFFER_SUBMIT_INFO};
     commands.commandBuffer = frame->commands;
-    VkSemaphoreSubmitInfo signal = {VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO};
-    signal.semaphore = timeline_;
-    signal.value = submission.value;
-    signal.stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
+    VkSemaphoreSubmitInfo signals[2] = {{VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO},
+                                        {VK_STRUCTURE_TYPE_SEMAPHORE_SUBMIT_INFO}};
+    signals[0].semaphore = timeline_;
+    signals[0].value = submission.value;
+    signals[1].semaphore = signal;
+    signals[0].stageMask = signals[1].stageMask = VK_PIPELINE_STAGE_2_ALL_COMMANDS_BIT;
     VkSubmitInfo2 info = {VK_STRUCTURE_TYPE_SUBMIT_INFO_2};
     info.waitSemaphoreInfoCount = static_cast<uint32_t>(waits.size());
     info.pWaitSemaphoreInfos = waits.data();
     info.commandBufferInfoCount = 1;
     info.pCommandBufferInfos = &commands;
-    info.signalSemaphoreInfoCount = 1;
-    info.pSignalSemaphoreInfos = &signal;
+    info.signalSemaphoreInfoCount = signal ? 2 : 1;
+    info.pSignalSemaphoreInfos = signals;
     const VkResult result = device_.vk.QueueSubmit2(handle_, 1, &info, frame->fence);
     if (result != VK_SUCCESS) {
         recycle(std::move(frame));

@@ -32,7 +32,9 @@ public:
     VulkanQueue& operator=(const VulkanQueue&) = delete;
 
     Status create(const char* name);
-    Status submit(const detail::Submission& submission, std::span<const VkSemaphoreSubmitInfo> waits);
+    /// `signal`: a binary semaphore to be signaled besides the time line, or none.
+    Status submit(const detail::Submission& submission, std::span<const VkSemaphoreSubmitInfo> waits,
+                  VkSemaphore signal);
     /// With validation only: waits for the fences of what was submitted up to `value`.
     void settle(uint64_t value) const;
     /// From any thread.

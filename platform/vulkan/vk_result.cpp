@@ -25,6 +25,10 @@ std::string resultName(VkResult result) {
         GLINT_VULKAN_NAME(VK_ERROR_FORMAT_NOT_SUPPORTED)
         GLINT_VULKAN_NAME(VK_ERROR_FRAGMENTED_POOL)
         GLINT_VULKAN_NAME(VK_ERROR_UNKNOWN)
+        GLINT_VULKAN_NAME(VK_SUBOPTIMAL_KHR)
+        GLINT_VULKAN_NAME(VK_ERROR_OUT_OF_DATE_KHR)
+        GLINT_VULKAN_NAME(VK_ERROR_SURFACE_LOST_KHR)
+        GLINT_VULKAN_NAME(VK_ERROR_NATIVE_WINDOW_IN_USE_KHR)
         GLINT_VULKAN_NAME(VK_ERROR_OUT_OF_POOL_MEMORY)
         GLINT_VULKAN_NAME(VK_ERROR_INVALID_EXTERNAL_HANDLE)
         GLINT_VULKAN_NAME(VK_ERROR_FRAGMENTATION)
@@ -45,6 +49,9 @@ Error resultError(const char* call, VkResult result) {
         case VK_ERROR_FRAGMENTED_POOL:
         case VK_ERROR_TOO_MANY_OBJECTS:
             return makeError(ErrorCode::OutOfMemory, "device.out_of_memory", "{} gave {}", call, resultName(result));
+        case VK_ERROR_SURFACE_LOST_KHR:
+            return makeError(ErrorCode::Internal, "window.lost", "{} gave {}: the system has taken the window away",
+                             call, resultName(result));
         case VK_ERROR_DEVICE_LOST:
             return makeError(ErrorCode::DeviceLost, "device.lost", "{} gave {}", call, resultName(result));
         default: return makeError(ErrorCode::Internal, "vulkan.result", "{} gave {}", call, resultName(result));

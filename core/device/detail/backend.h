@@ -14,8 +14,10 @@
 #include <glint/device/sampler.h>
 #include <glint/device/texture.h>
 #include <glint/device/tracing.h>
+#include <glint/device/window.h>
 
 #include <array>
+#include <bitset>
 #include <functional>
 #include <memory>
 #include <span>
@@ -25,6 +27,8 @@
 namespace glint::detail {
 
 constexpr size_t queue_count = static_cast<size_t>(Queue::Count);
+/// Pictures of a window that may be drawn at the same time.
+constexpr size_t frames_in_flight = 2;
 
 /// Base of what a back end makes for an object.
 struct Native {
@@ -198,6 +202,50 @@ struct NativeTracingDesc {
     std::string name;
 };
 
+/// What a window of the system is like, and what its user did since somebody last asked.
+struct WindowEvents {
+    uint32_t width = 0;  ///< pixels
+    uint32_t height = 0;
+    bool hidden = false;
+    bool focused = false;
+    bool close = false;  ///< was asked for
+    Vector2f mouse = {0, 0};
+    std::bitset<Window::ButtonCount> buttons, pressed_buttons;
+    std::bitset<Window::KeyCount> keys, pressed_keys;
+    Vector2f wheel = {0, 0};
+    std::string text;
+};
+
+/// A window of the system and the pictures that it shows in turn. All but present() from the thread of windows alone.
+struct NativeWindow : Native {
+    static constexpr uint32_t no_picture = ~0u;
+
+    struct Pictures {
+        TextureDesc desc;
+        WindowDesc::Sync sync = WindowDesc::Sync::Vertical;
+        std::vector<std::unique_ptr<NativeTexture>> textures;  ///< none while the window has no area
+    };
+
+    /// Delivers the events of all windows; sleeps until there are some, but no longer than this, if none of the
+    /// process's windows is shown.
+    virtual void poll(uint64_t nanoseconds) = 0;
+    virtual WindowEvents takeEvents() = 0;
+    virtual void setTitle(const std::string& title) = 0;
+    virtual void setSize(uint32_t width, uint32_t height) = 0;
+    virtual void setHidden(bool hidden) = 0;
+
+    /// New pictures, of the size that the window has now. What is under way with the ones before goes on.
+    /// Errors: "window.format", "window.lost".
+    virtual Expected<Pictures> createPictures() = 0;
+    /// Which picture is next; no_picture, without an error, if none gets free for a while or they are outdated.
+    virtual Expected<uint32_t> acquire() = 0;
+    /// Shows the picture that a submission has handed over; under the submit lock. Errors: "window.lost".
+    virtual Status present() = 0;
+
+    /// The pictures do not suit the window any more.
+    bool outdated = true;
+};
+
 struct TimelinePoint {
     Queue queue = Queue::Main;
     uint64_t value = 0;
@@ -209,6 +257,10 @@ struct Submission {
     std::span<const ResolvedList> lists;
     std::span<const TimelinePoint> waits;  ///< before the first command
     uint64_t value = 0;
+    /// Windows whose acquired picture these lists are the first to use: it has to be free before they draw or copy.
+    std::span<NativeWindow* const> acquired;
+    /// The window whose picture is presented next, once all of it is done.
+    NativeWindow* presented = nullptr;
 };
 
 /// What createDevice needs.
@@ -245,6 +297,9 @@ public:
     virtual Expected<std::unique_ptr<NativePipeline>> createPipeline(const PipelineDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeTracing>> createTracing(const NativeTracingDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeQuery>> createQuery(Query::Type type) = 0;
+    /// Called with FeaturePresent only. Errors: "window.no_display", "window.create", "window.unsupported",
+    /// "window.thread".
+    virtual Expected<std::unique_ptr<NativeWindow>> createWindow(const WindowDesc& desc) = 0;
 
     /// Bytes of one instance record.
     virtual uint32_t instanceSize() const = 0;

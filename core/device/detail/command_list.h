@@ -97,6 +97,7 @@ enum class CommandType : uint8_t {
     PushRegion,
     PopRegion,
     HostRead,  ///< does nothing; its accesses make writes visible to the CPU
+    Present,   ///< does nothing; its access gives the picture of a window the layout to be shown in
     Barrier,   ///< explicit full barrier, in untracked sections
     Count,
 };
@@ -343,6 +344,10 @@ struct HostReadCommand {
     CommandHeader header;
 };
 
+struct PresentCommand {
+    CommandHeader header;
+};
+
 struct BarrierCommand {
     CommandHeader header;
 };
@@ -368,6 +373,7 @@ struct CommandList {
     UnsetBytes commands;           ///< commands one after the other, each a multiple of 8 bytes
     std::vector<Access> accesses;
     std::vector<Object*> resources;  ///< one reference held for each
+    std::vector<uint32_t> pictures;  ///< the resources that are pictures of windows
     UnsetBytes inline_data;          ///< uploaded at submit, to an address aligned to 256 bytes
     uint32_t command_count = 0;
     uint32_t region_depth = 0;

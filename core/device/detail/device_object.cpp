@@ -156,7 +156,46 @@ bool DeviceObject::writeDirectly(BufferObject& buffer, uint64_t offset, const vo
     return true;
 }
 
-Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObject* fence, Where where) {
+Error DeviceObject::checkPictures(const RecorderCore& recorder) const {
+    const CommandList& list = recorder.list();
+    for (uint32_t resource : list.pictures) {
+        const auto& picture = *static_cast<const TextureObject*>(list.resources[resource]);
+        if (!picture.acquired_from)
+            return makeError(ErrorCode::InvalidArgument, "window.no_frame",
+                             "submit: the recorder '{}' uses {}, which is not the picture of the window's frame",
+                             list.label, picture.label());
+        if (recorder.queue() != Queue::Main)
+            return makeError(ErrorCode::InvalidArgument, "window.queue",
+                             "submit: the recorder '{}' uses {} on another queue than Queue::Main", list.label,
+                             picture.label());
+    }
+    return {};
+}
+
+void DeviceObject::setAcquired(TextureObject& picture, NativeWindow* window) {
+    std::lock_guard lock(submit_mutex_);
+    picture.acquired_from = window;
+    picture.awaited = false;
+    // As if they had just been written in the stages that wait for the picture: so the first transition comes after.
+    picture.uses.assign(1, {.write_stages = bit(Stage::ColorTarget) | bit(Stage::Copy)});
+}
+
+bool DeviceObject::isAwaited(const TextureObject& picture) {
+    std::lock_guard lock(submit_mutex_);
+    return picture.awaited;
+}
+
+void DeviceObject::waitUnused(const Object& object) {
+    std::array<uint64_t, queue_count> use;
+    {
+        std::lock_guard lock(submit_mutex_);
+        use = object.last_use;
+    }
+    if (!passed(*backend, use)) (void)wait(use, UINT64_MAX, Where::current());
+}
+
+Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObject* fence, Where where,
+                            NativeWindow* presented) {
     // Released after the locks: letting go of a list may delete objects.
     RecorderCore* transfers = nullptr;
     Status status;
@@ -180,9 +219,11 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
         }
         transfers = std::exchange(transfers_, nullptr);
         if (transfers) error = transfers->end(where).error();
+        if (transfers && !error && (error = checkPictures(*transfers))) (void)failed(error, where);
         for (RecorderCore* recorder : recorders) {
             const Status ended = recorder->end(where);
             if (!ended && !error) error = ended.error();
+            if (!error && (error = checkPictures(*recorder))) error = failed(error, where).error();
             recorder->submitted = true;
         }
         if (error) {
@@ -191,14 +232,14 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
             lists_.clear();
             if (transfers && !transfers->isEmpty()) lists_.push_back(&transfers->list());
             if (!lists_.empty() && queue != Queue::Main) {
-                status = play(Queue::Main, where);
+                status = play(Queue::Main, where, nullptr);
                 if (status) transfers->confirmBuilds();
                 lists_.clear();
             }
             if (status) {
                 for (RecorderCore* recorder : recorders)
                     if (!recorder->isEmpty()) lists_.push_back(&recorder->list());
-                if (!lists_.empty()) status = play(queue, where);
+                if (!lists_.empty()) status = play(queue, where, presented);
             }
             if (status) {
                 if (transfers) transfers->confirmBuilds();
@@ -210,6 +251,13 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
                 fence->values[static_cast<size_t>(queue)] = next_value_[static_cast<size_t>(queue)];
                 fence->values[static_cast<size_t>(Queue::Main)] = next_value_[static_cast<size_t>(Queue::Main)];
             }
+            if (status && presented) {
+                status = presented->present();
+                if (!status) {
+                    lost_ = lost_ || status.error().code() == ErrorCode::DeviceLost;
+                    status = failed(status.error(), where);
+                }
+            }
         }
     }
     if (transfers) recycleRecorder(transfers);
@@ -218,17 +266,28 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
     return status;
 }
 
-Status DeviceObject::play(Queue queue, Where where) {
+Status DeviceObject::play(Queue queue, Where where, NativeWindow* presented) {
     uint64_t& next = next_value_[static_cast<size_t>(queue)];
     const uint64_t value = next + 1;
     tracker_.resolve(queue, value, lists_);
-    const Submission submission = {queue, tracker_.lists(), tracker_.waits(), value};
+    acquired_.clear();
+    const auto forEachAcquired = [&](auto visit) {
+        for (const CommandList* list : lists_)
+            for (uint32_t resource : list->pictures) visit(*static_cast<TextureObject*>(list->resources[resource]));
+    };
+    forEachAcquired([&](TextureObject& picture) {
+        NativeWindow* const window = picture.acquired_from;
+        if (!picture.awaited && std::find(acquired_.begin(), acquired_.end(), window) == acquired_.end())
+            acquired_.push_back(window);
+    });
+    const Submission submission = {queue, tracker_.lists(), tracker_.waits(), value, acquired_, presented};
     if (Status status = backend->submit(submission); !status) {
         tracker_.rollback();
         lost_ = lost_ || status.error().code() == ErrorCode::DeviceLost;
         return failed(status.error(), where);
     }
     next = value;
+    forEachAcquired([](TextureObject& picture) { picture.awaited = true; });
     for (const CommandList* list : lists_)
         for (Object* object : list->resources) object->last_use[static_cast<size_t>(queue)] = value;
     return {};

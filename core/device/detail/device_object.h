@@ -54,7 +54,15 @@ public:
     /// Writes to a buffer without the GPU if its memory is host-visible and nothing submitted or queued uses it.
     bool writeDirectly(BufferObject& buffer, uint64_t offset, const void* data, uint64_t size);
 
-    Status submit(std::span<RecorderCore* const> recorders, FenceObject* fence, Where where);
+    /// `presented`: the window whose picture the last list hands over; it is shown at once.
+    Status submit(std::span<RecorderCore* const> recorders, FenceObject* fence, Where where,
+                  NativeWindow* presented = nullptr);
+    /// Makes the picture, or none, the one that lists may use; nothing is known of its contents.
+    void setAcquired(TextureObject& picture, NativeWindow* window);
+    /// True if a submission has used the acquired picture.
+    bool isAwaited(const TextureObject& picture);
+    /// Waits for the last uses of an object.
+    void waitUnused(const Object& object);
     Status flush(Where where) { return submit({}, nullptr, where); }
     /// Waits for every submission so far.
     Status waitIdle(Where where);
@@ -84,7 +92,8 @@ private:
     };
 
     RecorderCore* takeRecorder(Queue queue, std::string_view name);
-    Status play(Queue queue, Where where);
+    Error checkPictures(const RecorderCore& recorder) const;
+    Status play(Queue queue, Where where, NativeWindow* presented);
     Status failed(Error error, Where where);
 
     MessageCallback message_;
@@ -93,6 +102,7 @@ private:
     Tracker tracker_;
     std::array<uint64_t, queue_count> next_value_ = {};  // last value submitted
     std::vector<const CommandList*> lists_;
+    std::vector<NativeWindow*> acquired_;
     bool lost_ = false;
 
     std::mutex transfer_mutex_;          // of transfers_; taken before submit_mutex_

@@ -19,6 +19,7 @@ const char* toString(ObjectType type) {
         case ObjectType::Tracing: return "tracing";
         case ObjectType::Query: return "query";
         case ObjectType::Fence: return "fence";
+        case ObjectType::Window: return "window";
     }
     return "object";
 }
@@ -55,13 +56,15 @@ void Object::unhold() {
 }
 
 Error Object::fail(Error error) {
-    {
-        std::lock_guard lock(mutex_);
-        if (!error_) error_ = error;
-        state_.store(ObjectState::Failed, std::memory_order_release);
-    }
+    keep(error);
     if (device_) device_->report(error);
     return error;
+}
+
+void Object::keep(const Error& error) {
+    std::lock_guard lock(mutex_);
+    if (!error_) error_ = error;
+    state_.store(ObjectState::Failed, std::memory_order_release);
 }
 
 Error Object::error() const {

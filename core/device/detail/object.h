@@ -34,6 +34,7 @@ enum class ObjectType : uint8_t {
     Tracing,
     Query,
     Fence,
+    Window,
 };
 const char* toString(ObjectType type);
 
@@ -76,6 +77,8 @@ public:
     void setReady() { state_.store(ObjectState::Ready, std::memory_order_release); }
     /// Keeps the first error and tells the device's message callback. Returns the error it keeps.
     Error fail(Error error);
+    /// The same for an error that has been told already.
+    void keep(const Error& error);
     Error error() const;
 
     std::string name() const;
@@ -155,6 +158,12 @@ public:
     TextureDesc desc;  ///< mipmaps resolved, layers counts faces
     uint32_t samples = 1;
     std::vector<ResourceState> uses;  ///< one for each subresource, layer-major
+
+    bool is_picture = false;  ///< of a window
+    /// Of a picture, guarded by the submit lock: the window while the picture is the one of its frame, and whether a
+    /// submission has waited for it.
+    NativeWindow* acquired_from = nullptr;
+    bool awaited = false;
 };
 
 class SamplerObject final : public Object {

@@ -327,4 +327,12 @@ void RecorderCore::hostRead(BufferObject& buffer) {
     push<HostReadCommand>(CommandType::HostRead);
 }
 
+void RecorderCore::presentPicture(TextureObject& picture) {
+    const uint32_t resource = use(picture);
+    beginAccesses();
+    // The stage is that of the drawing before it: the semaphore that presentation waits for covers every stage.
+    access(resource, Stage::ColorTarget, AccessRead, Layout::Present, {0, 1, 0, 1});
+    push<PresentCommand>(CommandType::Present);
+}
+
 }  // namespace glint::detail

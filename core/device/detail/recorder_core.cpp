@@ -41,6 +41,7 @@ void RecorderCore::clear() {
     first_builds_.clear();
     for (Object* object : list_.resources) object->unhold();
     list_.resources.clear();
+    list_.pictures.clear();
     list_.bytes.clear();
     list_.commands.clear();
     list_.accesses.clear();
@@ -165,6 +166,8 @@ uint32_t RecorderCore::use(Object& object) {
             entry = {&object, static_cast<uint32_t>(list_.resources.size()), generation_};
             object.hold();
             list_.resources.push_back(&object);
+            if (object.type() == ObjectType::Texture && static_cast<TextureObject&>(object).is_picture)
+                list_.pictures.push_back(entry.index);
             return entry.index;
         }
         if (entry.object == &object) return entry.index;

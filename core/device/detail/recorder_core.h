@@ -83,6 +83,8 @@ public:
     void writeTracingSize(TracingObject& tracing);
     /// Makes what was copied to the buffer visible to the CPU after a wait.
     void hostRead(BufferObject& buffer);
+    /// Makes the picture of a window ready to be shown.
+    void presentPicture(TextureObject& picture);
 
     // Command.
     void beginTarget(TargetObject& target, Where where);

@@ -15,6 +15,9 @@ void RecorderCore::beginTarget(TargetObject& target, Where where) {
     for (uint32_t i = 0; i < color_count; i++)
         if (target.colors[i].texture) attachments[attachment_count++] = &target.colors[i];
     if (target.depth.texture) attachments[attachment_count++] = &target.depth;
+    if (target.is_window && !target.colors[0].texture)
+        return fail(where, ErrorCode::InvalidArgument, "window.no_frame",
+                    "{} has a picture between render() and present() only", target.label());
     if (attachment_count == 0)
         return fail(where, ErrorCode::InvalidArgument, "target.empty", "{} has no texture", target.label());
 

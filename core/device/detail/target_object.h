@@ -20,6 +20,7 @@ public:
 
     Attachment colors[max_targets];
     Attachment depth;
+    bool is_window = false;  ///< has textures only while the window has a frame
     float clear_depth = 1.0f;
     uint32_t clear_stencil = 0;
 };

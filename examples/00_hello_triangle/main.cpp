@@ -1,6 +1,6 @@
-// A triangle: a pipeline, a target, a command and a picture.
+// A triangle: a pipeline, a target, a command.
 
-#include "common/device.h"
+#include "common/viewer.h"
 
 #include <glint/math/math.h>
 
@@ -30,7 +30,9 @@ struct Parameters {
 }  // namespace
 
 int main(int argc, char** argv) {
-    Example example(EXAMPLE_NAME, "A triangle, drawn into a texture.");
+    Example example(EXAMPLE_NAME, "A triangle.");
+    float size = 0.75f;
+    example.addKnob("--scale", size, 0.1f, 2.0f, "Half the height of the triangle, of that of the picture");
     if (!example.parse(argc, argv)) return example.exitCode();
 
     Device device = openDevice(example);
@@ -45,24 +47,22 @@ int main(int argc, char** argv) {
     pipeline.loadShaderGLSL(Shader::TypeFragment, EXAMPLE_DIR "/main.shader", "FRAGMENT_SHADER=1");
     if (!pipeline.create()) return report(pipeline.error());
 
-    Texture picture = device.createTexture2D(FormatRGBAu8n, example.width(), example.height(), Texture::FlagTarget);
-    Target target = device.createTarget(picture);
-    target.setClearColor(Color::gray());
+    Viewer viewer(example, device);
+    const Status status = viewer.run([&](Frame& frame) {
+        const float angle = static_cast<float>(frame.time) + frame.view.turn();
+        const float scale = size / frame.view.distance();
+        const Parameters parameters = {{scale / frame.aspect(), scale}, {std::cos(angle), std::sin(angle)}};
 
-    PassTimer timer(example, device);
-    for (uint32_t frame = 0; frame < example.options().frames; frame++) {
-        const float angle = static_cast<float>(example.time(frame));
-        const Parameters parameters = {{0.75f / example.aspect(), 0.75f}, {std::cos(angle), std::sin(angle)}};
-
-        Command command = device.createCommand(target);
-        timer.begin(command, "triangle");
+        frame.target.setClearColor(Color::gray());
+        Command command = device.createCommand(frame.target);
+        frame.timer.begin(command, "triangle");
         command.setPipeline(pipeline);
         command.setUniform(0, parameters);
         command.setVertices(0, vertices);
         command.drawArrays(3);
-        timer.end(command);
-        if (Status status = device.submit(command); !status) return report(status.error());
-        if (Status status = timer.collect(); !status) return report(status.error());
-    }
-    return finish(example, device, picture);
+        frame.timer.end(command);
+        return device.submit(command);
+    });
+    if (!status) return report(status.error());
+    return viewer.finish();
 }

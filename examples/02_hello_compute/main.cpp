@@ -1,6 +1,6 @@
 // Particles: emitters spawn them, compute shaders move them and count the living, an indirect draw shows them.
 
-#include "common/device.h"
+#include "common/viewer.h"
 
 #include <glint/math/camera.h>
 
@@ -88,6 +88,11 @@ std::vector<Emitter> emittersAt(float time, std::array<float, emitter_pairs * 2>
 
 int main(int argc, char** argv) {
     Example example(EXAMPLE_NAME, "A particle system in compute shaders, drawn with indirect arguments.");
+    float gravity = 8.0f, wind = 4.0f, drag = 0.2f;
+    example.addKnob("--gravity", gravity, -20.0f, 20.0f, "Downward acceleration");
+    example.addKnob("--wind", wind, -20.0f, 20.0f, "Speed of the air, upward");
+    example.addKnob("--drag", drag, 0.0f, 2.0f, "How much of that speed a particle takes over in a second");
+    example.setStart(4.0);  // the scene has a past: that frame takes 240 steps from nothing
     if (!example.parse(argc, argv)) return example.exitCode();
 
     Device device = openDevice(example);
@@ -123,24 +128,22 @@ int main(int argc, char** argv) {
     Buffer indirect = device.createBuffer(Buffer::FlagStorage | Buffer::FlagIndirect, 7 * sizeof(uint32_t), "indirect");
     device.clearBuffer(counters);
 
-    Texture light =
-        device.createTexture2D(FormatRGBAf16, example.width(), example.height(), Texture::FlagTarget, "light");
-    Texture picture =
-        device.createTexture2D(FormatRGBAu8n, example.width(), example.height(), Texture::FlagSurface, "picture");
-    Target target = device.createTarget(light);
-    target.setClearColor(Color::black());
-
-    // The scene has a past: a frame at 4 seconds takes 240 steps from nothing.
-    PassTimer timer(example, device);
+    Texture light;
+    Target target;
     std::array<float, emitter_pairs* 2> owed = {};
     uint32_t steps = 0;
-    for (uint32_t frame = 0; frame < example.options().frames; frame++) {
-        const double time = example.options().time.value_or(4.0 + frame / 60.0);
-        const auto last_step = static_cast<uint32_t>(std::lround(time / static_cast<double>(step)));
+
+    Viewer viewer(example, device);
+    const Status status = viewer.run([&](Frame& frame) -> Status {
+        if (frame.is_resized) {
+            light = device.createTexture2D(FormatRGBAf16, frame.width, frame.height, Texture::FlagTarget, "light");
+            target = device.createTarget(light);
+        }
+        const auto last_step = static_cast<uint32_t>(std::lround(frame.time / static_cast<double>(step)));
         for (; steps < last_step; steps++) {
             const std::vector<Emitter> emitters = emittersAt(static_cast<float>(steps) * step, owed);
-            const Simulation simulation = {{0.0f, 0.0f, -8.0f, 0.0f},
-                                           {0.0f, 0.0f, 4.0f, 0.2f},
+            const Simulation simulation = {{0.0f, 0.0f, -gravity, 0.0f},
+                                           {0.0f, 0.0f, wind, drag},
                                            step,
                                            static_cast<uint32_t>(emitters.size()),
                                            max_particles,
@@ -150,7 +153,7 @@ int main(int argc, char** argv) {
 
             const bool last = steps + 1 == last_step;
             Compute compute = device.createCompute();
-            if (last) timer.begin(compute, "simulate");
+            if (last) frame.timer.begin(compute, "simulate");
             compute.setKernel(emit);
             compute.setUniform(0, simulation);
             compute.setUniform(1, block);
@@ -171,33 +174,34 @@ int main(int argc, char** argv) {
             compute.setStorageBuffers(0, {counters, indirect});
             compute.setPushConstants(1u);
             compute.dispatch(1);
-            if (last) timer.end(compute);
-            if (Status status = device.submit(compute); !status) return report(status.error());
+            if (last) frame.timer.end(compute);
+            if (Status submitted = device.submit(compute); !submitted) return submitted;
             std::swap(particles[0], particles[1]);
         }
 
+        const Vector3f centre = {0.0f, 0.0f, 4.0f};
+        const float angle = -0.14f * static_cast<float>(frame.time);
         Camera camera;
-        const float angle = -0.14f * static_cast<float>(time);
-        camera.lookAt({30.0f * std::cos(angle), 30.0f * std::sin(angle), 16.0f}, {0.0f, 0.0f, 4.0f});
-        camera.perspective(60.0f, example.aspect());
+        camera.lookAt(frame.view.eye({30.0f * std::cos(angle), 30.0f * std::sin(angle), 16.0f}, centre), centre);
+        camera.perspective(60.0f, frame.aspect());
         Command command = device.createCommand(target);
-        timer.begin(command, "draw");
+        frame.timer.begin(command, "draw");
         command.setPipeline(draw);
         command.setUniform(0, View{camera.parameters()});
         command.setStorageBuffer(0, particles[0]);
         command.drawArraysIndirect(indirect, 3 * sizeof(uint32_t));
-        timer.end(command);
+        frame.timer.end(command);
 
         Compute compute = device.createCompute();
-        timer.begin(compute, "tone");
+        frame.timer.begin(compute, "tone");
         compute.setKernel(tone);
         compute.setTexture(0, light);
-        compute.setSurfaceTexture(0, picture);
-        compute.dispatch(picture);
-        timer.end(compute);
-        if (Status status = device.submit({command, compute}); !status) return report(status.error());
-        if (Status status = timer.collect(); !status) return report(status.error());
-    }
+        compute.setSurfaceTexture(0, frame.picture);
+        compute.dispatch(frame.picture);
+        frame.timer.end(compute);
+        return device.submit({command, compute});
+    });
+    if (!status) return report(status.error());
 
     const Expected<std::vector<uint32_t>> count = device.read<uint32_t>(counters);
     if (!count) return report(count.error());
@@ -206,5 +210,5 @@ int main(int argc, char** argv) {
     example.statistics().counts["steps"] = steps;
     std::printf("%u particles after %u steps, %.1f ms a step, %.1f ms to draw\n", (*count)[0], steps,
                 example.statistics().median("simulate") * 1e-6, example.statistics().median("draw") * 1e-6);
-    return finish(example, device, picture);
+    return viewer.finish();
 }

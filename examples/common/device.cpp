@@ -36,22 +36,32 @@ int finish(Example& example, Device& device, const Texture& picture) {
 void PassTimer::begin(Recorder& recorder, const std::string& pass) {
     recorder.pushRegion(pass);
     if (!device_.getFeatures().has(FeatureTimestamps)) return;
-    if (used_ == queries_.size()) queries_.emplace_back(pass, device_.createQuery(Query::TypeTime, pass));
-    queries_[used_].first = pass;
-    recorder.beginQuery(queries_[used_].second);
+    Passes& now = passes_[frame_ % frames];
+    if (now.used == now.queries.size()) now.queries.emplace_back(pass, device_.createQuery(Query::TypeTime, pass));
+    now.queries[now.used].first = pass;
+    recorder.beginQuery(now.queries[now.used].second);
 }
 
 void PassTimer::end(Recorder& recorder) {
-    if (device_.getFeatures().has(FeatureTimestamps)) recorder.endQuery(queries_[used_++].second);
+    Passes& now = passes_[frame_ % frames];
+    if (device_.getFeatures().has(FeatureTimestamps)) recorder.endQuery(now.queries[now.used++].second);
     recorder.popRegion();
 }
 
-Status PassTimer::collect() {
-    for (size_t i = 0; i < used_; i++) {
-        const Expected<uint64_t> time = device_.getTime(queries_[i].second);
-        if (!time) return time.error();
-        example_.statistics().addPass(queries_[i].first, *time);
-    }
-    used_ = 0;
+Status PassTimer::next() { return collect(passes_[++frame_ % frames]); }
+
+Status PassTimer::finish() {
+    for (size_t i = 0; i < frames; i++)
+        if (Status status = next(); !status) return status;
     return device_.finish();
+}
+
+Status PassTimer::collect(Passes& passes) {
+    for (size_t i = 0; i < passes.used; i++) {
+        const Expected<uint64_t> time = device_.getTime(passes.queries[i].second);
+        if (!time) return time.error();
+        example_.statistics().addPass(passes.queries[i].first, *time);
+    }
+    passes.used = 0;
+    return {};
 }

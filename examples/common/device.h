@@ -4,6 +4,7 @@
 
 #include <glint/device/device.h>
 
+#include <array>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,18 +18,31 @@ int finish(Example& example, glint::Device& device, const glint::Texture& pictur
 /// Measures passes on the GPU for the statistics; does nothing on a device without time queries.
 class PassTimer {
 public:
+    /// Frames that may be under way at once.
+    static constexpr size_t frames = 3;
+
     PassTimer(Example& example, glint::Device& device) : example_(example), device_(device) {}
 
     /// Names the work of the recorder from here to end(), and times it.
     void begin(glint::Recorder& recorder, const std::string& pass);
     void end(glint::Recorder& recorder);
-    /// After the submit: waits for the frame and adds its times.
-    glint::Status collect();
+    /// Begins a frame: adds the times of the frame that was begun `frames` calls ago, for which it waits.
+    glint::Status next();
+    /// Adds the times of all frames that are under way, and waits for the device.
+    glint::Status finish();
+    /// Both at once, for a program that waits for each frame.
+    glint::Status collect() { return finish(); }
 
 private:
+    /// The passes of one frame; queries are used again.
+    struct Passes {
+        std::vector<std::pair<std::string, glint::Query>> queries;
+        size_t used = 0;
+    };
+    glint::Status collect(Passes& passes);
+
     Example& example_;
     glint::Device& device_;
-    std::vector<std::pair<std::string, glint::Query>>
-        queries_;  // one for each pass of the frame, used again by the next
-    size_t used_ = 0;
+    std::array<Passes, frames> passes_;
+    size_t frame_ = 0;
 };

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -36,6 +37,7 @@ struct Example::Parser {
     std::string size;
     double time = 0.0;
     CLI::Option* time_option = nullptr;
+    CLI::Option* frames_option = nullptr;
 };
 
 Example::Example(std::string name, const std::string& description)
@@ -48,10 +50,8 @@ Example::Example(std::string name, const std::string& description)
         ->type_name("WxH")
         ->default_str("1600x900")
         ->check([this](const std::string& text) { return parseSize(text, options_.width, options_.height); });
-    app.add_option("--frames", options_.frames, "Number of frames to draw")
-        ->type_name("N")
-        ->capture_default_str()
-        ->check(CLI::Range(1u, 1000000000u));
+    parser_->frames_option = app.add_option("--frames", options_.frames, "Number of frames to draw");
+    parser_->frames_option->type_name("N")->capture_default_str()->check(CLI::Range(1u, 1000000000u));
     parser_->time_option =
         app.add_option("--time", parser_->time, "Freeze the scene at this moment, in seconds")->type_name("SECONDS");
     parser_->time_option->check([](const std::string& text) {
@@ -70,6 +70,11 @@ Example::Example(std::string name, const std::string& description)
             const bool is_known = text == "auto" || text == "driver" || text == "software";
             return is_known ? std::string() : "'" + text + "' is none of auto, driver, software";
         });
+    app.add_flag("--window", options_.window,
+                 "Show the frames in a window, until it is closed or --frames are drawn; without a display as without "
+                 "this argument");
+    app.add_option("--screenshot", options_.screenshot, "Write what the window shows last to this file (.png)")
+        ->type_name("FILE");
 }
 
 Example::~Example() = default;
@@ -94,6 +99,37 @@ void Example::add(const std::string& flag, bool& value, const std::string& help)
     parser_->app.add_flag(flag, value, help);
 }
 
+namespace {
+
+/// "--scale" is the knob "scale".
+std::string knobName(const std::string& flag) {
+    return flag.substr(std::min(flag.find_first_not_of('-'), flag.size()));
+}
+
+}  // namespace
+
+void Example::addKnob(const std::string& flag, bool& value, const std::string& help) {
+    add(flag, value, help);
+    knobs_.push_back({knobName(flag), help, &value});
+}
+
+void Example::addKnob(const std::string& flag, uint32_t& value, uint32_t minimum, uint32_t maximum,
+                      const std::string& help) {
+    parser_->app.add_option(flag, value, help)
+        ->type_name("N")
+        ->capture_default_str()
+        ->check(CLI::Range(minimum, maximum));
+    knobs_.push_back({knobName(flag), help, &value, static_cast<float>(minimum), static_cast<float>(maximum)});
+}
+
+void Example::addKnob(const std::string& flag, float& value, float minimum, float maximum, const std::string& help) {
+    parser_->app.add_option(flag, value, help)
+        ->type_name("NUMBER")
+        ->capture_default_str()
+        ->check(CLI::Range(minimum, maximum));
+    knobs_.push_back({knobName(flag), help, &value, minimum, maximum});
+}
+
 bool Example::parse(int argc, const char* const* argv) {
     try {
         parser_->app.parse(argc, argv);
@@ -107,6 +143,7 @@ bool Example::parse(int argc, const char* const* argv) {
         return false;
     }
     if (parser_->time_option->count()) options_.time = parser_->time;
+    options_.frames_given = parser_->frames_option->count() > 0;
     statistics_.example = name_;
     statistics_.width = options_.width;
     statistics_.height = options_.height;
@@ -114,11 +151,19 @@ bool Example::parse(int argc, const char* const* argv) {
     return true;
 }
 
-glint::Status Example::saveImage(const glint::Image& image) const {
-    if (options_.image.empty()) return {};
-    if (glint::Status status = makeFolder(options_.image); !status) return status;
-    return image.save(options_.image);
+namespace {
+
+glint::Status saveTo(const std::filesystem::path& file, const glint::Image& image) {
+    if (file.empty()) return {};
+    if (glint::Status status = makeFolder(file); !status) return status;
+    return image.save(file);
 }
+
+}  // namespace
+
+glint::Status Example::saveImage(const glint::Image& image) const { return saveTo(options_.image, image); }
+
+glint::Status Example::saveScreenshot(const glint::Image& image) const { return saveTo(options_.screenshot, image); }
 
 int Example::finish() {
     if (options_.stats.empty()) return 0;

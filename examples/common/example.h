@@ -22,18 +22,32 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <variant>
+#include <vector>
 
 /// Arguments that every example takes.
 struct ExampleOptions {
     uint32_t width = 1600;  ///< --size WxH, texels: each from 1 to 16384
     uint32_t height = 900;
-    uint32_t frames = 1;           ///< --frames N: how many to draw; 1 or more
-    std::optional<double> time;    ///< --time SECONDS: every frame shows this moment; not negative
-    std::filesystem::path image;   ///< --image FILE: where to write the last frame; empty: nowhere
-    std::filesystem::path stats;   ///< --stats FILE.json: where to write the statistics; empty: nowhere
-    std::string adapter;           ///< --adapter N|NAME: index or part of a name; empty: the best
-    std::string api;               ///< --api NAME; empty: the default
-    std::string tracing = "auto";  ///< --tracing auto|driver|software
+    uint32_t frames = 1;               ///< --frames N: how many to draw; 1 or more
+    bool frames_given = false;         ///< else a window stays until it is closed
+    std::optional<double> time;        ///< --time SECONDS: every frame shows this moment; not negative
+    std::filesystem::path image;       ///< --image FILE: where to write the last frame; empty: nowhere
+    std::filesystem::path stats;       ///< --stats FILE.json: where to write the statistics; empty: nowhere
+    std::string adapter;               ///< --adapter N|NAME: index or part of a name; empty: the best
+    std::string api;                   ///< --api NAME; empty: the default
+    std::string tracing = "auto";      ///< --tracing auto|driver|software
+    bool window = false;               ///< --window
+    std::filesystem::path screenshot;  ///< --screenshot FILE: where to write what a window shows last; empty: nowhere
+};
+
+/// An argument that may also be changed while the example runs in a window.
+struct Knob {
+    std::string name;
+    std::string help;
+    std::variant<bool*, uint32_t*, float*> value;
+    float minimum = 0.0f;
+    float maximum = 1.0f;
 };
 
 class Example {
@@ -52,6 +66,16 @@ public:
     /// An argument without a value: `value` becomes true if it is given.
     void add(const std::string& flag, bool& value, const std::string& help);
 
+    /// The same as knobs of the panel that a window has, from `minimum` to `maximum`; `value` may change with every
+    /// frame.
+    void addKnob(const std::string& flag, bool& value, const std::string& help);
+    void addKnob(const std::string& flag, uint32_t& value, uint32_t minimum, uint32_t maximum, const std::string& help);
+    void addKnob(const std::string& flag, float& value, float minimum, float maximum, const std::string& help);
+    std::vector<Knob>& knobs() { return knobs_; }
+
+    /// The moment that the first frame shows, unless --time says otherwise; 0 without this call.
+    void setStart(double seconds) { start_ = seconds; }
+
     /// Reads the arguments. False if the program should end now, with exitCode(): 0 after --help, 2 after a wrong
     /// argument, which has been reported on stderr.
     bool parse(int argc, const char* const* argv);
@@ -64,13 +88,15 @@ public:
     /// Width / height.
     float aspect() const { return static_cast<float>(options_.width) / static_cast<float>(options_.height); }
     /// The moment that frame `frame` shows, seconds: --time if given, else 1/60 s for each frame, so that a run is the
-    /// same on every machine.
-    double time(uint32_t frame) const { return options_.time.value_or(frame / 60.0); }
+    /// same on every machine. Windows go by the clock instead.
+    double time(uint32_t frame) const { return options_.time.value_or(start_ + frame / 60.0); }
 
     Statistics& statistics() { return statistics_; }
 
     /// Writes a picture where --image says, if it does; folders are made.
     glint::Status saveImage(const glint::Image& image) const;
+    /// The same for --screenshot.
+    glint::Status saveScreenshot(const glint::Image& image) const;
     /// Writes the statistics where --stats says, if it does, and ends the program: the exit code.
     int finish();
 
@@ -80,6 +106,8 @@ private:
     std::string name_;
     ExampleOptions options_;
     Statistics statistics_;
+    std::vector<Knob> knobs_;
+    double start_ = 0.0;
     int exit_code_ = 0;
 };
 

@@ -35,6 +35,18 @@ double Statistics::median(const std::string& pass) const {
     return 0.0;
 }
 
+std::vector<std::string> Statistics::passNames() const {
+    std::vector<std::string> names;
+    for (const Pass& each : passes_) names.push_back(each.name);
+    return names;
+}
+
+double Statistics::last(const std::string& pass) const {
+    for (const Pass& each : passes_)
+        if (each.name == pass && !each.times.empty()) return static_cast<double>(each.times.back());
+    return 0.0;
+}
+
 std::string Statistics::text() const {
     nlohmann::ordered_json json = {{"example", example}, {"width", width}, {"height", height}, {"frames", frames}};
     const auto addText = [&](const char* key, const std::string& value) {

@@ -36,6 +36,11 @@ struct Statistics {
     /// Median of a pass's times, nanoseconds; 0 for an unknown pass.
     double median(const std::string& pass) const;
 
+    /// In the order in which they were first seen.
+    std::vector<std::string> passNames() const;
+    /// The newest time of a pass, nanoseconds; 0 for an unknown pass.
+    double last(const std::string& pass) const;
+
     /// The JSON text, ending in a newline.
     std::string text() const;
     /// Errors: those of writeFile.

@@ -96,18 +96,59 @@ TEST(Example, WrongArgumentsEndWithTwo) {
                                                          {"--time", "inf"},
                                                          {"--time", "soon"},
                                                          {"--tracing", "magic"},
-                                                         {"--window"},
+                                                         {"--screenshot"},
+                                                         {"--turn", "2"},
+                                                         {"--turn", "nan"},
+                                                         {"--many", "9"},
                                                          {"--unknown"},
                                                          {"stray"},
                                                          {"--image"}};
     for (const auto& arguments : cases) {
         Example example("05_tracing", "Rays.");
+        float turn = 0.5f;
+        uint32_t many = 3;
+        example.addKnob("--turn", turn, 0.0f, 1.0f, "how far");
+        example.addKnob("--many", many, 1u, 8u, "how many");
         const Outcome run = parse(example, arguments);
         EXPECT_FALSE(run.parsed) << arguments[0];
         EXPECT_EQ(example.exitCode(), 2) << arguments[0];
         EXPECT_TRUE(run.errors.starts_with("05_tracing: ")) << run.errors;
         EXPECT_NE(run.errors.find(arguments.back()), std::string::npos) << run.errors;
     }
+}
+
+TEST(Example, KnobsAreArgumentsToo) {
+    Example example("05_tracing", "Rays.");
+    float turn = 0.5f;
+    uint32_t many = 3;
+    bool quick = false;
+    example.addKnob("--turn", turn, 0.0f, 1.0f, "how far");
+    example.addKnob("--many", many, 1u, 8u, "how many");
+    example.addKnob("--quick", quick, "less work");
+    ASSERT_TRUE(parse(example, {"--turn", "0.25", "--many", "8", "--quick"}).parsed);
+    EXPECT_EQ(turn, 0.25f);
+    EXPECT_EQ(many, 8u);
+    EXPECT_TRUE(quick);
+    ASSERT_EQ(example.knobs().size(), 3u);
+    EXPECT_EQ(example.knobs()[0].name, "turn");
+    EXPECT_EQ(example.knobs()[1].help, "how many");
+    EXPECT_EQ(example.knobs()[1].maximum, 8.0f);
+    EXPECT_EQ(std::get<bool*>(example.knobs()[2].value), &quick);
+}
+
+TEST(Example, StartsWhereItSays) {
+    Example example("05_tracing", "Rays.");
+    example.setStart(4.0);
+    ASSERT_TRUE(parse(example, {"--window", "--screenshot", "a.png"}).parsed);
+    EXPECT_TRUE(example.options().window);
+    EXPECT_FALSE(example.options().frames_given);
+    EXPECT_EQ(example.options().screenshot, "a.png");
+    EXPECT_EQ(example.time(30), 4.5);
+    Example frozen("05_tracing", "Rays.");
+    frozen.setStart(4.0);
+    ASSERT_TRUE(parse(frozen, {"--time", "1", "--frames", "1"}).parsed);
+    EXPECT_TRUE(frozen.options().frames_given);
+    EXPECT_EQ(frozen.time(30), 1.0);
 }
 
 TEST(Example, HelpListsEveryArgument) {
@@ -119,7 +160,7 @@ TEST(Example, HelpListsEveryArgument) {
     EXPECT_EQ(example.exitCode(), 0);
     EXPECT_EQ(run.errors, "");
     for (const char* text : {"Rays.", "--size", "--frames", "--time", "--image", "--stats", "--adapter", "--api",
-                             "--tracing", "--help", "--kind", "which kind", "1600x900"})
+                             "--tracing", "--window", "--screenshot", "--help", "--kind", "which kind", "1600x900"})
         EXPECT_NE(run.output.find(text), std::string::npos) << text << "\n" << run.output;
 }
 

@@ -157,6 +157,7 @@ Status LayoutCache::fill(SetLayout& set) {
 Status LayoutCache::refill(SetLayout& layout) {
     const uint32_t count = layout.next_count;
     std::vector<VkDescriptorPoolSize> sizes;
+    sizes.reserve(layout.bindings.size());
     for (const SetLayout::Binding& binding : layout.bindings) sizes.push_back({binding.type, binding.count * count});
     VkDescriptorPoolCreateInfo pool_info = {VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool_info.maxSets = count;

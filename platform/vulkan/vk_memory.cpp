@@ -42,7 +42,7 @@ VKAPI_ATTR void VKAPI_CALL onFree(VmaAllocator, uint32_t, VkDeviceMemory, VkDevi
 }
 
 Error memoryError(const char* call, VkResult result, uint64_t size) {
-    const Error error = resultError(call, result);
+    Error error = resultError(call, result);
     if (error.code() != ErrorCode::OutOfMemory) return error;
     return makeError(ErrorCode::OutOfMemory, "device.out_of_memory", "{} gave {} for {} bytes", call,
                      resultName(result), size);

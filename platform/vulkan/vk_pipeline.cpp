@@ -117,11 +117,13 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     }
 
     std::vector<VkVertexInputBindingDescription> buffers;
+    buffers.reserve(desc.vertex_buffers.size());
     for (const VertexBuffer& buffer : desc.vertex_buffers) {
         buffers.push_back({static_cast<uint32_t>(buffers.size()), buffer.stride,
                            buffer.rate ? VK_VERTEX_INPUT_RATE_INSTANCE : VK_VERTEX_INPUT_RATE_VERTEX});
     }
     std::vector<VkVertexInputAttributeDescription> attributes;
+    attributes.reserve(desc.attributes.size());
     for (const VertexAttribute& attribute : desc.attributes) {
         attributes.push_back({attribute.location, attribute.buffer, vulkanFormat(attribute.format), attribute.offset});
     }
@@ -164,6 +166,7 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     depth.back = stencilState(desc.stencil_back, desc);
 
     std::vector<VkPipelineColorBlendAttachmentState> blends;
+    blends.reserve(desc.blends.size());
     for (const BlendDesc& blend : desc.blends) blends.push_back(blendState(blend));
     blends.resize(desc.color_formats.size(), blendState({}));
     VkPipelineColorBlendStateCreateInfo blending = {VK_STRUCTURE_TYPE_PIPELINE_COLOR_BLEND_STATE_CREATE_INFO};
@@ -177,6 +180,7 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     dynamic.pDynamicStates = dynamic_states;
 
     std::vector<VkFormat> formats;
+    formats.reserve(desc.color_formats.size());
     for (Format format : desc.color_formats) formats.push_back(vulkanFormat(format));
     VkPipelineRenderingCreateInfo rendering = {VK_STRUCTURE_TYPE_PIPELINE_RENDERING_CREATE_INFO};
     rendering.colorAttachmentCount = static_cast<uint32_t>(formats.size());

@@ -109,7 +109,7 @@ VkDescriptorSet Player::writeSet(const PipelineLayout& layout, const PipelineLay
     for (uint32_t i = 0; i < set.element_count; i++) {
         const LayoutElement& element = layout.elements[set.first_element + i];
         uint64_t offset = 0;
-        if (element.uniform && !layout.dynamic) offset = uniforms[uniform++];
+        if (element.uniform && !layout.dynamic && uniforms) offset = uniforms[uniform++];
         if (!writeElement(element, elements[set.first_element + i], offset, descriptors_[i])) return VK_NULL_HANDLE;
     }
     vk_.UpdateDescriptorSetWithTemplate(device_.handle, written, set.layout->update, descriptors_.data());

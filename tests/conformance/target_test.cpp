@@ -173,9 +173,10 @@ TEST_F(TargetTest, MipLevelsAndLayers) {
 }
 
 TEST_F(TargetTest, ResolvesSamples) {
-    for (const auto& [samples, flag] :
-         {std::pair{2u, Texture::FlagMultisample2}, std::pair{4u, Texture::FlagMultisample4},
-          std::pair{8u, Texture::FlagMultisample8}}) {
+    for (const uint32_t samples : {2u, 4u, 8u}) {
+        const Texture::Flags flag = samples == 2   ? Texture::FlagMultisample2
+                                    : samples == 4 ? Texture::FlagMultisample4
+                                                   : Texture::FlagMultisample8;
         if (samples > device.getFeatures().maxTextureSamples) continue;
         if (!device.hasTexture(FormatRGBAu8n, Texture::FlagTarget | flag)) continue;
         SCOPED_TRACE(samples);

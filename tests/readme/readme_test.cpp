@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdlib>
 #include <set>
 
@@ -28,10 +29,10 @@ TEST(Readme, ProgramRendersAMesh) {
     ASSERT_EQ(image->width(), 512u);
     ASSERT_EQ(image->height(), 512u);
     uint32_t background = 0;
-    std::set<int> shades;
+    std::set<long> shades;
     for (uint32_t y = 0; y < 512; y++)
         for (uint32_t x = 0; x < 512; x++) {
-            const int shade = static_cast<int>(image->load(x, y).x * 255.0f + 0.5f);
+            const long shade = std::lround(image->load(x, y).x * 255.0f);
             background += shade == 64;
             shades.insert(shade);
         }

@@ -165,14 +165,15 @@ Expected<Layout> layoutOf(const Image& image) {
 }  // namespace
 
 Expected<Image> decodePng(std::span<const std::byte> bytes, uint64_t limit) {
-    const auto malformed = [](const char* reason) {
-        return unexpected(makeError(ErrorCode::Io, "image.png_malformed", "not a readable PNG file: {}", reason));
+    Session session;
+    session.input = bytes;
+    const auto malformed = [&](const char* reason) {
+        return unexpected(makeError(ErrorCode::Io, "image.png_malformed", "no readable PNG file, before byte {}: {}",
+                                    session.position, reason));
     };
     if (bytes.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(bytes.data()), 0, 8) != 0)
         return malformed("it does not begin with PNG's signature");
 
-    Session session;
-    session.input = bytes;
     session.png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &session, onError, onWarning);
     if (session.png) session.info = png_create_info_struct(session.png);
     if (!session.info)

@@ -2,6 +2,7 @@
 #include "support/files.h"
 #include "support/image_compare.h"
 #include "support/matchers.h"
+#include "support/png_chunks.h"
 #include "support/reference.h"
 
 #include <glint/base/file.h>
@@ -30,28 +31,6 @@ std::vector<std::byte> bytesOf(std::initializer_list<int> values) {
     std::vector<std::byte> bytes;
     for (const int value : values) bytes.push_back(static_cast<std::byte>(value));
     return bytes;
-}
-
-uint32_t crc(std::span<const std::byte> bytes) {
-    uint32_t value = ~0u;
-    for (const std::byte byte : bytes) {
-        value ^= static_cast<uint32_t>(byte);
-        for (int k = 0; k < 8; k++) value = value & 1 ? 0xedb88320u ^ value >> 1 : value >> 1;
-    }
-    return ~value;
-}
-
-// Gives every chunk its right checksum again, so that mutations reach what lies behind it.
-void repairChecksums(std::vector<std::byte>& png) {
-    size_t at = 8;
-    while (at + 12 <= png.size()) {
-        size_t length = 0;
-        for (size_t k = 0; k < 4; k++) length = length << 8 | static_cast<size_t>(png[at + k]);
-        if (length > png.size() - at - 12) return;
-        const uint32_t value = crc(std::span(png).subspan(at + 4, length + 4));
-        for (size_t k = 0; k < 4; k++) png[at + 8 + length + k] = static_cast<std::byte>(value >> (24 - 8 * k));
-        at += 12 + length;
-    }
 }
 
 // What a PNG file is made of; `rows` are not compressed, each row begins with its filter.

@@ -82,7 +82,7 @@ private:
     std::optional<std::string_view> takeText(size_t end) {
         const std::string_view rest(reinterpret_cast<const char*>(file_.data()) + at_, end - at_);
         const size_t length = rest.find('\0');
-        if (length == std::string_view::npos || length > 255) return std::nullopt;
+        if (length > 255) return std::nullopt;  // npos too
         at_ += length + 1;
         return rest.substr(0, length);
     }

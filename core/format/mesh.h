@@ -18,8 +18,9 @@ namespace glint {
 /// A named run of a mesh's triangles.
 struct MeshPart {
     std::string name;
-    uint32_t first_index = 0;  ///< a multiple of 3
-    uint32_t index_count = 0;  ///< a multiple of 3
+    uint32_t first_index = 0;        ///< a multiple of 3
+    uint32_t index_count = 0;        ///< a multiple of 3
+    uint32_t material = UINT32_MAX;  ///< of Scene::materials of the same file; UINT32_MAX is none
     bool operator==(const MeshPart&) const = default;
 };
 
@@ -35,9 +36,10 @@ struct Mesh {
     std::vector<uint32_t> indices;    ///< three for each triangle
     std::vector<MeshPart> parts;      ///< in the order of their triangles; empty means one part without a name
 
-    /// Reads a file; its ending says which format it has (".obj", see parseObj; ".ply", see parsePly). Degenerate and
-    /// repeated triangles are kept, and triangles keep the order of the file. Errors: those of readFile,
-    /// "mesh.unknown_extension" and those of the format; they name the file and the line.
+    /// Reads a file; its ending says which format it has (".obj", see parseObj; ".ply", see parsePly; ".gltf" and ".glb":
+    /// the scene at rest, see Scene::mesh). Degenerate and repeated triangles are kept, and triangles keep the order of
+    /// the file. Errors: those of readFile, "mesh.unknown_extension" and those of the format; they name the file and the
+    /// line or the element.
     static Expected<Mesh> load(const std::filesystem::path& path, uint64_t limit = default_limit);
 
     /// Writes a file, as its ending says (".ply", see encodePly). Errors: those of writeFile, "mesh.unknown_extension"

@@ -2,6 +2,7 @@
 
 #include <glint/base/file.h>
 #include <glint/base/format_error.h>
+#include <glint/format/scene.h>
 
 #include <glm/geometric.hpp>
 
@@ -38,7 +39,15 @@ Expected<Mesh> Mesh::load(const std::filesystem::path& path, uint64_t limit) {
         if (!bytes) return unexpected(bytes.error());
         return parsePly(*bytes, name, limit);
     }
-    return unexpected(unknownExtension(path, ".obj or .ply"));
+    if (kind == ".gltf" || kind == ".glb") {
+        const Expected<Scene> scene = Scene::load(path, limit, false);
+        if (!scene) return unexpected(scene.error());
+        Expected<Mesh> mesh = scene->mesh(scene->pose(), limit);
+        if (mesh) return mesh;
+        return unexpected(
+            Error::inFile(mesh.error().code(), mesh.error().id().data(), mesh.error().message(), name, 0));
+    }
+    return unexpected(unknownExtension(path, ".obj, .ply, .gltf or .glb"));
 }
 
 Status Mesh::save(const std::filesystem::path& path) const {

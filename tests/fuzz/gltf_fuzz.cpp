@@ -1,36 +1,42 @@
 // Any bytes give an error or a scene that can be posed and flattened.
 
-#include "fuzz.h"
-
 #include <glint/base/log.h>
 #include <glint/format/gltf.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 using namespace glint;
 
 namespace {
 
+constexpr uint64_t limit = 1 << 20;
+
+/// Ends the program, so that libFuzzer keeps the input.
+void require(bool condition) {
+    if (!condition) std::abort();
+}
+
 void flatten(const Scene& scene, const ScenePose& pose) {
-    const Expected<Mesh> mesh = scene.mesh(pose, fuzz::limit);
-    fuzz::require(mesh ? static_cast<bool>(mesh->validate()) : mesh.error().id().starts_with("mesh."));
+    const Expected<Mesh> mesh = scene.mesh(pose, limit);
+    require(mesh ? static_cast<bool>(mesh->validate()) : mesh.error().id().starts_with("mesh."));
 }
 
 }  // namespace
 
-int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
+extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
     [[maybe_unused]] static const bool is_silent = [] {
         setLogCallback([](LogLevel, std::string_view, std::string_view) {});
         return true;
     }();
     GltfOptions options;
-    options.limit = fuzz::limit;
+    options.limit = limit;
     options.read = [](const std::string& name, uint64_t most) -> Expected<std::vector<std::byte>> {
         return std::vector<std::byte>(std::min<uint64_t>(most, 64), static_cast<std::byte>(name.size()));
     };
-    const Expected<Scene> scene = parseGltf(fuzz::bytesOf(data, size), options);
+    const Expected<Scene> scene = parseGltf(std::as_bytes(std::span(data, size)), options);
     if (!scene) {
-        fuzz::require(scene.error().id().starts_with("gltf.") || scene.error().id().starts_with("image."));
+        require(scene.error().id().starts_with("gltf.") || scene.error().id().starts_with("image."));
         return 0;
     }
     flatten(*scene, scene->pose());

@@ -20,13 +20,14 @@ std::string describe(const ShaderResource& resource) {
     static constexpr const char* dimensions[] = {
         "", " 2D", " 3D", " cube", " 2D array", " cube array", " 2D multisampled"};
     text += dimensions[static_cast<size_t>(resource.dimension)];
+    if (resource.descriptor != resource.element) text += " of the software engine";
     text += fmt::format(" '{}'", resource.name);
     if (resource.count > 1) text += fmt::format(" of {} elements", resource.count);
     return text;
 }
 
 bool agree(const ShaderResource& a, const ShaderResource& b) {
-    return a.kind == b.kind && a.element == b.element && a.combined == b.combined &&
+    return a.kind == b.kind && a.element == b.element && a.descriptor == b.descriptor && a.combined == b.combined &&
            a.texel_storage == b.texel_storage && a.count == b.count &&
            (a.dimension == b.dimension || a.kind == SlotKind::Table);
 }
@@ -54,6 +55,37 @@ void merge(ShaderResource& into, const ShaderResource& from) {
     for (const std::string& alias : from.aliases) addName(into, alias);
 }
 
+/// One list of the stages' resources, merged, in (set, binding) order.
+Expected<std::vector<ShaderResource>> mergeResources(std::span<const Reflection* const> stages,
+                                                     std::vector<ShaderResource> Reflection::*list) {
+    std::vector<Merged> merged;
+    for (const Reflection* reflection : stages) {
+        for (const ShaderResource& resource : reflection->*list) {
+            const auto same = std::find_if(merged.begin(), merged.end(), [&](const Merged& other) {
+                return other.resource.set == resource.set && other.resource.binding == resource.binding;
+            });
+            if (same == merged.end()) {
+                merged.push_back({resource, reflection->stage});
+            } else if (agree(same->resource, resource)) {
+                merge(same->resource, resource);
+            } else {
+                return unexpected(makeError(ErrorCode::ShaderCompile, "shader.binding_conflict",
+                                            "set {}, binding {} is {} in the {} stage, but {} in the {} stage",
+                                            resource.set, resource.binding, describe(same->resource),
+                                            toString(same->stage), describe(resource), toString(reflection->stage)));
+            }
+        }
+    }
+    std::sort(merged.begin(), merged.end(), [](const Merged& a, const Merged& b) {
+        return a.resource.set != b.resource.set ? a.resource.set < b.resource.set
+                                                : a.resource.binding < b.resource.binding;
+    });
+    std::vector<ShaderResource> result;
+    result.reserve(merged.size());
+    for (Merged& entry : merged) result.push_back(std::move(entry.resource));
+    return result;
+}
+
 }  // namespace
 
 const char* toString(ShaderStage stage) {
@@ -71,39 +103,23 @@ const char* toString(SlotKind kind) {
 
 Expected<BindingLayout> mergeLayouts(std::span<const Reflection* const> stages) {
     BindingLayout layout;
-    std::vector<Merged> merged;
     for (const Reflection* reflection : stages) {
         layout.stages |= stageBit(reflection->stage);
         if (reflection->push_size) layout.push_stages |= stageBit(reflection->stage);
         layout.push_size = std::max(layout.push_size, reflection->push_size);
-        for (const ShaderResource& resource : reflection->resources) {
-            const auto same = std::find_if(merged.begin(), merged.end(), [&](const Merged& other) {
-                return other.resource.set == resource.set && other.resource.binding == resource.binding;
-            });
-            if (same == merged.end()) {
-                merged.push_back({resource, reflection->stage});
-            } else if (agree(same->resource, resource)) {
-                merge(same->resource, resource);
-            } else {
-                return unexpected(makeError(ErrorCode::ShaderCompile, "shader.binding_conflict",
-                                            "set {}, binding {} is {} in the {} stage, but {} in the {} stage",
-                                            resource.set, resource.binding, describe(same->resource),
-                                            toString(same->stage), describe(resource), toString(reflection->stage)));
-            }
-        }
     }
-
-    std::sort(merged.begin(), merged.end(), [](const Merged& a, const Merged& b) {
-        return a.resource.set != b.resource.set ? a.resource.set < b.resource.set
-                                                : a.resource.binding < b.resource.binding;
-    });
-    for (Merged& entry : merged) {
-        const auto index = static_cast<uint32_t>(layout.resources.size());
-        layout.slots[static_cast<size_t>(entry.resource.kind)].push_back(index);
-        if (entry.resource.combined && entry.resource.kind == SlotKind::Texture)
-            layout.slots[static_cast<size_t>(SlotKind::Sampler)].push_back(index);
-        layout.set_count = std::max(layout.set_count, entry.resource.set + 1);
-        layout.resources.push_back(std::move(entry.resource));
+    Expected<std::vector<ShaderResource>> resources = mergeResources(stages, &Reflection::resources);
+    if (!resources) return unexpected(resources.error());
+    layout.resources = std::move(*resources);
+    resources = mergeResources(stages, &Reflection::hidden);
+    if (!resources) return unexpected(resources.error());
+    layout.hidden = std::move(*resources);
+    for (uint32_t i = 0; i < layout.resources.size(); i++) {
+        const ShaderResource& resource = layout.resources[i];
+        layout.slots[static_cast<size_t>(resource.kind)].push_back(i);
+        if (resource.combined && resource.kind == SlotKind::Texture)
+            layout.slots[static_cast<size_t>(SlotKind::Sampler)].push_back(i);
+        layout.set_count = std::max(layout.set_count, resource.set + 1);
     }
     return layout;
 }

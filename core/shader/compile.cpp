@@ -129,22 +129,20 @@ void dropSourceExtensions(std::vector<uint32_t>& words) {
     words.resize(out);
 }
 
-}  // namespace
-
-Expected<std::vector<uint32_t>> compile(const ShaderSource& source, const Preprocessed& text) {
+Expected<std::vector<uint32_t>> translate(const ShaderSource& source, const Preprocessed& text,
+                                          glslang::EShTargetLanguageVersion target, EShMessages rules) {
     // Never finalised: other threads may be compiling while static objects are destroyed.
     static std::once_flag initialized;
     std::call_once(initialized, [] { glslang::InitializeProcess(); });
 
     const EShLanguage language = languageOf(source.stage);
-    const auto rules = static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules);
     const char* string = text.text.data();
     const int length = static_cast<int>(text.text.size());
     glslang::TShader shader(language);
     shader.setStringsWithLengths(&string, &length, 1);
     shader.setEnvInput(glslang::EShSourceGlsl, language, glslang::EShClientVulkan, 100);
     shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_3);
-    shader.setEnvTarget(glslang::EShTargetSpv, glslang::EShTargetSpv_1_6);
+    shader.setEnvTarget(glslang::EShTargetSpv, target);
     shader.setEntryPoint(source.entry.c_str());
     shader.setSourceEntryPoint(source.entry.c_str());
     const bool parsed = shader.parse(GetDefaultResources(), 460, false, rules);
@@ -171,6 +169,18 @@ Expected<std::vector<uint32_t>> compile(const ShaderSource& source, const Prepro
                                       fmt::format("no SPIR-V was made: {}", logger.getAllMessages())));
     dropSourceExtensions(words);
     return words;
+}
+
+}  // namespace
+
+Expected<std::vector<uint32_t>> compile(const ShaderSource& source, const Preprocessed& text) {
+    return translate(source, text, glslang::EShTargetSpv_1_6,
+                     static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules));
+}
+
+Expected<std::vector<uint32_t>> compileLibrary(const ShaderSource& source, const Preprocessed& text, uint32_t version) {
+    return translate(source, text, static_cast<glslang::EShTargetLanguageVersion>(version),
+                     static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules | EShMsgKeepUncalled));
 }
 
 }  // namespace glint::shader

@@ -161,6 +161,7 @@ private:
                 resource.write = !flags.get(spv::DecorationNonWritable);
             }
             resource.element = resource.kind;
+            resource.descriptor = resource.kind;
             if (resource.count == 0) resource.kind = SlotKind::Table;
             reflection_.resources.push_back(std::move(resource));
         }

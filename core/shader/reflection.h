@@ -59,8 +59,11 @@ enum class ImageDimension : uint8_t { None, Image2D, Image3D, Cube, Image2DArray
 struct ShaderResource {
     SlotKind kind = SlotKind::Uniform;
     SlotKind element = SlotKind::Uniform;  ///< what one element of a Table is; the kind itself for anything else
-    std::string name;                      ///< the block's or the variable's name
-    std::string instance;                  ///< blocks: the variable's name, empty without one
+    /// What the module declares there for each binding: the same as `element`, but for a Tracing that was rewritten
+    /// for the software engine. That is one block, Uniform or Storage, of its `count` references, 16 bytes apart.
+    SlotKind descriptor = SlotKind::Uniform;
+    std::string name;      ///< the block's or the variable's name
+    std::string instance;  ///< blocks: the variable's name, empty without one
     uint32_t set = 0;
     uint32_t binding = 0;
     uint32_t count = 1;          ///< array elements (the product of all dimensions), 0 for an array of unknown length
@@ -111,6 +114,8 @@ struct Reflection {
     std::array<uint32_t, 3> group_size = {1, 1, 1};  ///< compute, task and mesh stages; constants at their defaults
     /// Id of the specialisation constant that sets this dimension of group_size, no_constant if it is fixed.
     std::array<uint32_t, 3> group_constants = {no_constant, no_constant, no_constant};
+    /// What the software engine binds for a rewritten shader, in a set of its own; none of them is a user's slot.
+    std::vector<ShaderResource> hidden;
     bool uses_ray_query = false;  ///< or declares an acceleration structure outside the ray-tracing stages
     bool uses_addresses = false;  ///< buffer references
     bool uses_float64 = false;
@@ -128,6 +133,7 @@ Expected<Reflection> reflect(std::span<const uint32_t> words, std::string_view e
 struct BindingLayout {
     /// Merged resources in (set, binding) order; `stages` is the union.
     std::vector<ShaderResource> resources;
+    std::vector<ShaderResource> hidden;  ///< likewise, the software engine's own
     /// slots[kind][i] is the index into `resources` of slot i of that kind; aliases of one binding share a resource.
     std::array<std::vector<uint32_t>, static_cast<size_t>(SlotKind::Count)> slots;
     uint32_t push_size = 0;

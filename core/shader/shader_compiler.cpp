@@ -11,7 +11,7 @@ namespace glint {
 namespace {
 
 /// Raised with any change of what the steps make of the same text, or of what an entry holds.
-constexpr uint32_t cache_version = 1;
+constexpr uint32_t cache_version = 2;
 
 Hash toolHash() {
     static const Hash hash = [] {
@@ -22,12 +22,14 @@ Hash toolHash() {
     return hash;
 }
 
-/// Of everything that decides the result: `text` holds the includes and the macros.
-Hash makeKey(const ShaderSource& source, std::string_view text, std::span<const uint32_t> words) {
+/// Of everything that decides the result: the texts hold the includes and the macros.
+Hash makeKey(const ShaderSource& source, std::string_view text, std::span<const uint32_t> words,
+             std::string_view library) {
     const std::array<uint8_t, 2> kind = {static_cast<uint8_t>(source.language), static_cast<uint8_t>(source.stage)};
     Hash key = hashBytes(kind.data(), kind.size(), toolHash());
     key = hashText(source.entry, key);
     key = hashText(text, key);
+    if (!library.empty()) key = hashText(fmt::format("{} {}", source.tracing.set, library), key);
     return hashBytes(words.data(), words.size_bytes(), key);
 }
 
@@ -38,6 +40,11 @@ Expected<CompiledShader> finish(const ShaderSource& source, std::vector<uint32_t
     if (!reflection)
         return unexpected(
             shader::sourceError(source, ErrorCode::ShaderCompile, "shader.reflect", reflection.error().message()));
+    if (!source.tracing.library.empty()) {
+        Expected<std::vector<uint32_t>> rewritten = shader::rewriteRayQueries(source, words, *reflection);
+        if (!rewritten) return unexpected(rewritten.error());
+        words = std::move(*rewritten);
+    }
     CompiledShader result;
     result.reflection = std::move(*reflection);
     Expected<std::vector<uint32_t>> optimized = shader::optimizeValid(source, words);
@@ -66,7 +73,13 @@ Expected<CompiledShader> compileShader(const ShaderSource& source) {
         }
     }
 
-    const Hash key = makeKey(source, text.text, words);
+    shader::Preprocessed library;
+    if (!source.tracing.library.empty()) {
+        Expected<shader::Preprocessed> preprocessed = shader::preprocessLibrary(source.tracing);
+        if (!preprocessed) return unexpected(preprocessed.error());
+        library = std::move(*preprocessed);
+    }
+    const Hash key = makeKey(source, text.text, words, library.text);
     std::optional<CompiledShader> cached = shader::loadFromCache(key);
     if (!cached) {
         if (source.language != ShaderSource::Language::SPIRV) {

@@ -13,6 +13,14 @@
 
 namespace glint {
 
+/// By whom a shader's ray queries are answered: by the driver, or by a traversal library of Glint's own, for which the
+/// module is rewritten (docs/shaders.md, "Ray queries in software").
+struct TracingRewrite {
+    std::string library;  ///< the library, as #include finds it ("glint/tracing/plain.h"); empty: the driver
+    std::string macros;   ///< for the library alone, such as the form its nodes are read in
+    uint32_t set = 7;  ///< the library's own descriptor set, above those of the shader; the same for a program's stages
+};
+
 /// What a shader is made from: GLSL, SPIR-V assembly or SPIR-V words.
 struct ShaderSource {
     enum class Language : uint8_t { GLSL, Assembly, SPIRV };
@@ -24,6 +32,7 @@ struct ShaderSource {
     std::string macros;           ///< "RAYGEN_SHADER=1; GROUP_SIZE=64"; a name alone is defined as empty
     std::vector<std::filesystem::path> include_paths;  ///< beside the folder of the including file and the SDK's own
     std::string entry = "main";
+    TracingRewrite tracing;
 };
 
 /// When a file was last written and how long it is: enough to notice a change without reading it.
@@ -52,7 +61,7 @@ struct CompiledShader {
 /// The steps, one by one; compileShader runs them all. Pure functions; safe to call from several threads.
 /// All errors name the file, the line and the macros: ids "shader.empty", "shader.macro", "shader.include",
 /// "shader.preprocess", "shader.compile", "shader.assemble", "shader.validate", "shader.optimize", "shader.reflect",
-/// "shader.stage" (SPIR-V for another stage), "shader.entry" (no such entry point).
+/// "shader.stage" (SPIR-V for another stage), "shader.entry" (no such entry point), and those of rewriteRayQueries.
 /// Bytes that are no SPIR-V are errors in every step, never a crash.
 namespace shader {
 
@@ -77,6 +86,14 @@ Expected<std::vector<uint32_t>> compile(const ShaderSource& source, const Prepro
 Expected<std::vector<uint32_t>> assemble(const ShaderSource& source);
 /// Khronos' rules for Vulkan 1.3, with scalar block layout, and that there is an entry point for the source's stage.
 Status validate(const ShaderSource& source, std::span<const uint32_t> words);
+/// Makes a valid module's ray queries calls of the library that `source.tracing` names, which has one. `reflection` is
+/// that of the module: it learns what became of the acceleration structures, and what the library declares.
+/// A module without queries and structures comes back as it is.
+/// Errors: "shader.tracing_stage" (a stage of ray-tracing pipelines), "shader.tracing_set" (a resource at or above
+/// `source.tracing.set`), "shader.tracing_unsupported" (what the software engine cannot do, named), and
+/// "shader.tracing_internal" (a fault of the library or of the rewriting, with the module that came of it).
+Expected<std::vector<uint32_t>> rewriteRayQueries(const ShaderSource& source, std::span<const uint32_t> words,
+                                                  Reflection& reflection);
 /// Optimises for speed; names stay, `precise` is respected, interfaces keep their locations and bindings.
 Expected<std::vector<uint32_t>> optimize(const ShaderSource& source, std::span<const uint32_t> words);
 /// SPIR-V assembly with friendly names; empty if the words are no SPIR-V.

@@ -124,8 +124,8 @@ concept Is = std::is_same_v<std::remove_const_t<T>, Of>;
 
 template <class Archive, Is<ShaderResource> Value>
 void visit(Archive& archive, Value& v) {
-    archive(v.kind, v.element, v.name, v.instance, v.set, v.binding, v.count, v.size, v.stride, v.read, v.write,
-            v.combined, v.texel_storage, v.has_lone_matrix, v.has_row_major, v.dimension, v.stages, v.aliases);
+    archive(v.kind, v.element, v.descriptor, v.name, v.instance, v.set, v.binding, v.count, v.size, v.stride, v.read,
+            v.write, v.combined, v.texel_storage, v.has_lone_matrix, v.has_row_major, v.dimension, v.stages, v.aliases);
 }
 
 template <class Archive, Is<SpecializationConstant> Value>
@@ -140,7 +140,7 @@ void visit(Archive& archive, Value& v) {
 
 template <class Archive, Is<Reflection> Value>
 void visit(Archive& archive, Value& v) {
-    archive(v.stage, v.entry, v.resources, v.constants, v.inputs, v.outputs, v.push_size, v.group_size,
+    archive(v.stage, v.entry, v.resources, v.hidden, v.constants, v.inputs, v.outputs, v.push_size, v.group_size,
             v.group_constants, v.uses_ray_query, v.uses_addresses, v.uses_float64, v.uses_int64, v.uses_subgroups);
 }
 

@@ -59,6 +59,15 @@ uint32_t executionModel(ShaderStage stage);
 /// Words in this machine's byte order: SPIR-V may come in either.
 std::vector<uint32_t> nativeWords(std::span<const uint32_t> words);
 
+/// GLSL of the SDK's own to SPIR-V of this version (0x10300 or 0x10400) with all its functions, called or not.
+Expected<std::vector<uint32_t>> compileLibrary(const ShaderSource& source, const Preprocessed& text, uint32_t version);
+
+/// The text of the library that a source is to be rewritten for.
+Expected<Preprocessed> preprocessLibrary(const TracingRewrite& tracing);
+
+/// SPIR-V's number of a stage.
+uint32_t executionModel(ShaderStage stage);
+
 /// `validate` without the check of the stage; what is wrong with the words, or nothing. `instruction` is the number of
 /// the instruction that it concerns, counted from 1, 0 if it is none.
 std::optional<std::string> findFault(std::span<const uint32_t> words, uint64_t* instruction = nullptr);

@@ -116,7 +116,7 @@ std::vector<EntryPoint> entryPoints(std::span<const uint32_t> words) {
 }
 
 Status checkEntry(const ShaderSource& source, std::span<const uint32_t> words) {
-    const auto model = static_cast<uint32_t>(modelOf(source.stage));
+    const uint32_t model = executionModel(source.stage);
     bool named = false;
     std::string others;
     for (const EntryPoint& point : entryPoints(words)) {

@@ -1,0 +1,673 @@
+// What rewritten shaders compute: the same shader asks the driver's ray queries and, rewritten, the plain library,
+// about the same random scenes.
+
+#include "conformance/conformance.h"
+#include "support/reference.h"
+
+#include <glint/geometry/primitives.h>
+#include <glint/shader/shader_compiler.h>
+
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <set>
+
+namespace glint::test {
+
+namespace {
+
+struct Ray {
+    Vector3f origin;
+    uint32_t mask = 0xff;
+    Vector3f direction;
+    float maximum = 1000;
+};
+
+struct Hit {
+    uint32_t kind, front, instance, data;
+    uint32_t geometry, primitive, record, candidates;
+    float t, tmin;
+    Vector2f barycentrics;
+    Vector4f origin, direction;  ///< in the object's space
+    Matrix4x4f to_world, to_object;
+};
+
+constexpr uint32_t ray_opaque = 1, ray_no_opaque = 2, ray_first = 4, ray_cull_back = 16, ray_cull_front = 32,
+                   ray_cull_opaque = 64, ray_cull_no_opaque = 128, ray_skip_triangles = 256, ray_skip_boxes = 512;
+
+constexpr std::string_view declarations = R"(
+layout(local_size_x = 64) in;
+struct Ray { vec3 origin; uint mask; vec3 direction; float maximum; };
+struct Hit { uint kind, front, instance, data, geometry, primitive, record, candidates; float t, tmin; vec2 barycentrics;
+             vec4 origin, direction; mat4 to_world, to_object; };
+layout(set = 0, binding = 1, std430) readonly buffer Rays { Ray rays[]; };
+layout(set = 0, binding = 2, std430) writeonly buffer Hits { Hit hits[]; };
+layout(set = 1, binding = 0, std430) readonly buffer Boxes { float boxes[]; };
+layout(push_constant) uniform Push { uint count; uint flags; uint confirm; };
+
+Hit describe(rayQueryEXT q, uint candidates) {
+    Hit hit;
+    hit.kind = rayQueryGetIntersectionTypeEXT(q, true);
+    hit.candidates = candidates;
+    hit.front = hit.instance = hit.data = hit.geometry = hit.primitive = hit.record = 0u;
+    hit.t = 0.0;
+    hit.tmin = rayQueryGetRayTMinEXT(q);
+    hit.barycentrics = vec2(0.0);
+    hit.origin = vec4(rayQueryGetWorldRayOriginEXT(q), float(rayQueryGetRayFlagsEXT(q)));
+    hit.direction = vec4(rayQueryGetWorldRayDirectionEXT(q), 0.0);
+    hit.to_world = hit.to_object = mat4(0.0);
+    if (hit.kind == gl_RayQueryCommittedIntersectionNoneEXT) return hit;
+    hit.instance = uint(rayQueryGetIntersectionInstanceIdEXT(q, true));
+    hit.data = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(q, true));
+    hit.geometry = uint(rayQueryGetIntersectionGeometryIndexEXT(q, true));
+    hit.primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(q, true));
+    hit.record = rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(q, true);
+    hit.t = rayQueryGetIntersectionTEXT(q, true);
+    hit.origin = vec4(rayQueryGetIntersectionObjectRayOriginEXT(q, true), hit.origin.w);
+    hit.direction = vec4(rayQueryGetIntersectionObjectRayDirectionEXT(q, true), 0.0);
+    hit.to_world = mat4(rayQueryGetIntersectionObjectToWorldEXT(q, true));
+    hit.to_object = mat4(rayQueryGetIntersectionWorldToObjectEXT(q, true));
+    if (hit.kind == gl_RayQueryCommittedIntersectionTriangleEXT) {
+        hit.barycentrics = rayQueryGetIntersectionBarycentricsEXT(q, true);
+        hit.front = rayQueryGetIntersectionFrontFaceEXT(q, true) ? 1u : 0u;
+    }
+    return hit;
+}
+
+float enterBox(vec3 origin, vec3 direction, uint box) {
+    vec3 a = (vec3(boxes[box * 6u], boxes[box * 6u + 1u], boxes[box * 6u + 2u]) - origin) / direction;
+    vec3 b = (vec3(boxes[box * 6u + 3u], boxes[box * 6u + 4u], boxes[box * 6u + 5u]) - origin) / direction;
+    vec3 near = min(a, b), far = max(a, b);
+    float enter = max(max(near.x, near.y), max(near.z, 0.0));
+    return enter <= min(min(far.x, far.y), far.z) ? enter : -1.0;
+}
+
+// Whether a non-opaque triangle is there: depends on the candidate's getters.
+bool takes(rayQueryEXT q) {
+    uint primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(q, false));
+    if (confirm == 2u) return (primitive + uint(rayQueryGetIntersectionInstanceIdEXT(q, false))) % 3u != 0u;
+    if (confirm == 3u) return rayQueryGetIntersectionFrontFaceEXT(q, false);
+    if (confirm == 4u) return rayQueryGetIntersectionBarycentricsEXT(q, false).x < 0.5;
+    return confirm == 1u;
+}
+
+uint finish(rayQueryEXT q) {
+    uint candidates = 0u;
+    while (rayQueryProceedEXT(q)) {
+        candidates++;
+        if (rayQueryGetIntersectionTypeEXT(q, false) == gl_RayQueryCandidateIntersectionTriangleEXT) {
+            if (takes(q)) rayQueryConfirmIntersectionEXT(q);
+        } else {
+            float t = enterBox(rayQueryGetIntersectionObjectRayOriginEXT(q, false),
+                               rayQueryGetIntersectionObjectRayDirectionEXT(q, false),
+                               uint(rayQueryGetIntersectionPrimitiveIndexEXT(q, false)));
+            if (t >= 0.0 && confirm != 0u) rayQueryGenerateIntersectionEXT(q, t);
+        }
+        if (confirm == 5u) rayQueryTerminateEXT(q);
+    }
+    return candidates;
+}
+)";
+
+constexpr std::string_view simple = R"(
+layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    rayQueryEXT q;
+    rayQueryInitializeEXT(q, scene, flags, rays[i].mask, rays[i].origin, 0.0, rays[i].direction, rays[i].maximum);
+    uint candidates = finish(q);
+    hits[i] = describe(q, candidates);
+})";
+
+/// A scene for both engines.
+struct Geometry {
+    Mesh mesh;
+    std::vector<float> boxes;
+};
+
+struct Bottom {
+    std::vector<Geometry> geometries;
+    bool opaque = true;
+};
+
+struct Scene {
+    std::vector<Bottom> bottoms;
+    std::vector<Tracing::Instance> instances;
+    std::vector<Matrix4x4f> transforms;
+    std::vector<uint32_t> used;  ///< the bottom level of each instance
+};
+
+class RewriteGpuTest : public ConformanceTest {
+protected:
+    void SetUp() override {
+        ConformanceTest::SetUp();
+        if (device && !device.getFeatures().computeTracing) GTEST_SKIP() << "the adapter has no ray queries";
+    }
+
+    Buffer input(const void* data, size_t size) {
+        return device.createBuffer(Buffer::FlagTracing | Buffer::FlagStorage, data, size, "input");
+    }
+
+    static void put(std::vector<uint32_t>& words, const float* values, size_t count) {
+        for (size_t i = 0; i < count; i++) words.push_back(std::bit_cast<uint32_t>(values[i]));
+    }
+
+    /// The scene as the plain library reads it; returns the address of its top level.
+    static uint32_t encode(const Scene& scene, std::vector<uint32_t>& words) {
+        std::vector<uint32_t> addresses;
+        for (const Bottom& bottom : scene.bottoms) {
+            const auto address = static_cast<uint32_t>(words.size());
+            addresses.push_back(address);
+            words.push_back(static_cast<uint32_t>(bottom.geometries.size()));
+            words.resize(words.size() + 4 * bottom.geometries.size());
+            for (size_t g = 0; g < bottom.geometries.size(); g++) {
+                const Geometry& geometry = bottom.geometries[g];
+                const auto first = static_cast<uint32_t>(words.size());
+                for (const uint32_t index : geometry.mesh.indices) put(words, &geometry.mesh.positions[index].x, 3);
+                put(words, geometry.boxes.data(), geometry.boxes.size());
+                uint32_t* record = &words[address + 1 + 4 * g];
+                record[0] = geometry.boxes.empty() ? 0 : 1;
+                record[1] = first;
+                record[2] = static_cast<uint32_t>(geometry.mesh.indices.size() / 3 + geometry.boxes.size() / 6);
+                record[3] = bottom.opaque;
+            }
+        }
+        const auto top = static_cast<uint32_t>(words.size());
+        words.push_back(static_cast<uint32_t>(scene.instances.size()));
+        for (size_t i = 0; i < scene.instances.size(); i++) {
+            const Tracing::Instance& instance = scene.instances[i];
+            const size_t first = words.size();
+            put(words, instance.transform, 12);
+            const Transform3x4 inverse(Matrix4x4f(glm::inverse(Matrix4x4d(scene.transforms[i]))));
+            put(words, inverse.rows.data(), 12);
+            words.push_back(instance.data | instance.mask << 24);
+            words.push_back(instance.offset | instance.flags << 24);
+            words.push_back(addresses[scene.used[i]]);
+            words.resize(first + 32);
+        }
+        words.resize(words.size() + 32);
+        return top;
+    }
+
+    /// The scene as the driver has it.
+    Tracing build(const Scene& scene) {
+        std::vector<Tracing> bottoms;
+        for (const Bottom& bottom : scene.bottoms) {
+            Tracing tracing = device.createTracing("bottom");
+            const bool boxes = !bottom.geometries[0].boxes.empty();
+            for (const Geometry& geometry : bottom.geometries) {
+                if (boxes) {
+                    tracing.addBoundBuffer(static_cast<uint32_t>(geometry.boxes.size() / 6), 24,
+                                           input(geometry.boxes.data(), geometry.boxes.size() * 4));
+                    continue;
+                }
+                const Mesh& mesh = geometry.mesh;
+                tracing.addVertexBuffer(static_cast<uint32_t>(mesh.positions.size()), FormatRGBf32, 12,
+                                        input(mesh.positions.data(), mesh.positions.size() * 12));
+                tracing.addIndexBuffer(static_cast<uint32_t>(mesh.indices.size()), FormatRu32,
+                                       input(mesh.indices.data(), mesh.indices.size() * 4));
+            }
+            Tracing::Flags flags = Tracing::FlagFastTrace;
+            if (!bottom.opaque) flags |= Tracing::FlagTransparent;
+            EXPECT_THAT(tracing.create(boxes ? Tracing::TypeBound : Tracing::TypeTriangle, flags), IsOk());
+            bottoms.push_back(tracing);
+        }
+        std::vector<Tracing::Instance> instances = scene.instances;
+        for (size_t i = 0; i < instances.size(); i++) instances[i].tracing = &bottoms[scene.used[i]];
+        const Tracing top = device.createTracing(std::span<const Tracing::Instance>(instances));
+        for (const Tracing& bottom : bottoms) device.buildTracing(bottom);
+        device.buildTracing(top);
+        return top;
+    }
+
+    static void place(Scene& scene, uint32_t bottom, const Matrix4x4f& transform, uint32_t mask = 0xff,
+                      uint32_t flags = 0) {
+        Tracing::Instance instance;
+        const Transform3x4 rows(transform);
+        std::copy(rows.rows.begin(), rows.rows.end(), instance.transform);
+        instance.data = static_cast<uint32_t>(0xabc000 + scene.instances.size());
+        instance.offset = static_cast<uint32_t>(0x123400 + scene.instances.size());
+        instance.mask = mask;
+        instance.flags = flags;
+        scene.instances.push_back(instance);
+        scene.transforms.push_back(transform);
+        scene.used.push_back(bottom);
+    }
+
+    static Mesh soup(Random& random, uint32_t triangles) {
+        Mesh mesh;
+        for (uint32_t i = 0; i < triangles; i++) {
+            const Vector3d centre(random.uniform(-2, 2), random.uniform(-2, 2), random.uniform(-2, 2));
+            for (uint32_t k = 0; k < 3; k++) {
+                mesh.indices.push_back(static_cast<uint32_t>(mesh.positions.size()));
+                mesh.positions.push_back(Vector3f(centre + random.direction() * random.uniform(0.3, 1.2)));
+            }
+        }
+        return mesh;
+    }
+
+    static std::vector<float> randomBoxes(Random& random, uint32_t count) {
+        std::vector<float> boxes;
+        for (uint32_t i = 0; i < count; i++) {
+            std::array<float, 6> box = {};
+            for (size_t axis = 0; axis < 3; axis++) {
+                box[axis] = static_cast<float>(random.uniform(-2, 1.5));
+                box[axis + 3] = box[axis] + static_cast<float>(random.uniform(0.2, 0.8));
+            }
+            boxes.insert(boxes.end(), box.begin(), box.end());
+        }
+        return boxes;
+    }
+
+    /// Solid and transparent triangles in several geometries, instances that are turned, stretched, mirrored, masked
+    /// and flagged.
+    static Scene triangles(uint32_t seed) {
+        Random random(seed);
+        Scene scene;
+        scene.bottoms.push_back({{{soup(random, 20), {}}, {createSphere(1.0f, 1), {}}}, true});
+        scene.bottoms.push_back({{{createTorus(1.2f, 0.4f, 8, 6), {}}, {soup(random, 15), {}}}, false});
+        place(scene, 0, translate({0.5f, 0, 0}) * rotateX(33));
+        place(scene, 1, translate({-1, 1, 0.4f}) * rotateY(70) * scale({0.5f, 1.4f, 0.8f}), 0x0f);
+        place(scene, 0, translate({0, -1.2f, 1}) * scale({-1, 1, 1}) * rotateZ(20), 0xf0);
+        place(scene, 1, rotateX(111) * scale({0.6f, 0.6f, 0.6f}), 0xff, Tracing::InstanceOpaque);
+        place(scene, 0, translate({1, 1, -1}), 0x3c, Tracing::InstanceTransparent);
+        place(scene, 1, translate({-1.5f, -0.5f, 0}), 0xff, Tracing::InstanceFlipFacing);
+        place(scene, 0, translate({0, 2, 0}) * rotateY(10), 0xff, Tracing::InstanceCullDisable);
+        return scene;
+    }
+
+    static std::vector<Ray> castRays(uint32_t count) {
+        Random random(count);
+        std::vector<Ray> rays;
+        for (uint32_t i = 0; i < count; i++) {
+            const Vector3d origin = random.direction() * random.uniform(1, 7);
+            const Vector3d aim = random.direction() * random.uniform(0, 2.5);
+            const uint32_t masks[] = {0xff, 0x01, 0x30, 0x80, 0xffffff0f};
+            rays.push_back({Vector3f(origin), masks[i % 5], Vector3f(aim - origin) * 0.37f, i % 7 ? 1000.0f : 2.0f});
+        }
+        return rays;
+    }
+
+    Kernel driverKernel(std::string_view text) {
+        Kernel kernel = device.createKernel("driver");
+        kernel.createShaderGLSL(text);
+        EXPECT_THAT(kernel.create(), IsOk());
+        return kernel;
+    }
+
+    /// The rewritten shader as the SPIR-V that it now is: the references are an ordinary block. Not optimised yet, so
+    /// that what it declares and does not use keeps its slot.
+    static Shader softwareShader(const std::string& text, ShaderStage stage, Shader::Type type) {
+        ShaderSource source;
+        source.stage = stage;
+        source.text = text;
+        source.name = "test.shader";
+        source.tracing.library = "glint/tracing/plain.h";
+        const Expected<shader::Preprocessed> preprocessed = shader::preprocess(source);
+        EXPECT_THAT(preprocessed, IsOk());
+        const Expected<std::vector<uint32_t>> words = shader::compile(source, *preprocessed);
+        EXPECT_THAT(words, IsOk());
+        if (!words) return {};
+        Expected<Reflection> reflection = reflect(*words);
+        EXPECT_THAT(reflection, IsOk());
+        const Expected<std::vector<uint32_t>> rewritten = shader::rewriteRayQueries(source, *words, *reflection);
+        EXPECT_THAT(rewritten, IsOk());
+        return rewritten ? Shader::createSPIRV(type, *rewritten, "rewritten") : Shader();
+    }
+
+    Kernel softwareKernel(const std::string& text) {
+        Kernel kernel = device.createKernel("software");
+        kernel.setShader(softwareShader(text, ShaderStage::Compute, Shader::TypeCompute));
+        EXPECT_THAT(kernel.create(), IsOk());
+        return kernel;
+    }
+
+    struct Call {
+        uint32_t flags = 0;
+        uint32_t confirm = 1;
+        std::vector<float> boxes = {0};
+    };
+
+    std::vector<Hit> run(const Kernel& kernel, const std::vector<Ray>& rays, const Call& call,
+                         const std::function<void(Compute&)>& bind) {
+        const Buffer ray_buffer = makeBuffer(rays), box_buffer = makeBuffer(call.boxes);
+        const Buffer hits = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(Hit));
+        compute([&](Compute& list) {
+            list.setKernel(kernel);
+            bind(list);
+            list.setStorageBuffer(Slot::at(0, 1), ray_buffer);
+            list.setStorageBuffer(Slot::at(0, 2), hits);
+            list.setStorageBuffer(Slot::at(1, 0), box_buffer);
+            list.setPushConstants(
+                std::array<uint32_t, 3>{static_cast<uint32_t>(rays.size()), call.flags, call.confirm});
+            list.dispatch(rays.size());
+        });
+        return read<Hit>(hits);
+    }
+
+    /// Both engines on one scene.
+    struct Pair {
+        std::vector<Hit> driver, software;
+    };
+
+    Pair compare(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
+        if (!driver_) driver_ = driverKernel(std::string(declarations) + std::string(simple));
+        if (!software_) software_ = softwareKernel(std::string(declarations) + std::string(simple));
+        const Tracing top = build(scene);
+        std::vector<uint32_t> words;
+        const std::array<uint32_t, 4> reference = {encode(scene, words), 0, 0, 0};
+        const Buffer buffer = makeBuffer(words);
+        Pair pair;
+        pair.driver = run(driver_, rays, call, [&](Compute& list) { list.setTracing(0, top); });
+        pair.software = run(software_, rays, call, [&](Compute& list) {
+            list.setUniform(Slot::at(0, 0), reference);
+            list.setStorageBuffer(Slot::at(7, 0), buffer);
+        });
+        return pair;
+    }
+
+    /// How far apart the engines' t may be. In the object's space every coordinate of the ray and of the corners is
+    /// rounded to within a few units of 2^-24 of the largest, R: the transform of the origin has 4 terms, differences
+    /// and products add as many again, less than 16 in all. Along the ray that is R 2^-20 / cos, for each of two
+    /// engines; cos between the ray and the triangle's normal is computed here in float64.
+    static double tolerance(const Scene& scene, const Hit& hit) {
+        const Geometry& geometry = scene.bottoms[scene.used[hit.instance]].geometries[hit.geometry];
+        const Vector3d origin = Vector3f(hit.origin), direction = Vector3f(hit.direction);
+        double slope = 1, largest = glm::length(origin) + glm::length(direction) * std::abs(static_cast<double>(hit.t));
+        if (geometry.boxes.empty()) {
+            std::array<Vector3d, 3> corners;
+            for (size_t k = 0; k < 3; k++)
+                corners[k] = Vector3d(geometry.mesh.positions[geometry.mesh.indices[3 * hit.primitive + k]]);
+            for (const Vector3d& corner : corners) largest = std::max(largest, glm::length(corner));
+            const Vector3d normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
+            slope = std::abs(glm::dot(normal, direction));
+        } else {
+            // A box is entered through an axis' plane.
+            slope = 1e300;
+            for (int axis = 0; axis < 3; axis++)
+                if (std::abs(direction[axis]) > 1e-3) slope = std::min(slope, std::abs(direction[axis]));
+        }
+        return 2 * largest * 0x1p-20 / slope;
+    }
+
+    static bool nearEdge(const Hit& hit) {
+        return hit.kind == 1 &&
+               std::min({hit.barycentrics.x, hit.barycentrics.y, 1 - hit.barycentrics.x - hit.barycentrics.y}) < 1e-4f;
+    }
+
+    /// The engines agree on every ray, but for those that pass an edge or meet two surfaces at once.
+    static size_t expectSame(const Scene& scene, const Pair& pair) {
+        size_t found = 0, apart = 0;
+        EXPECT_EQ(pair.driver.size(), pair.software.size());
+        for (size_t i = 0; i < pair.driver.size(); i++) {
+            const Hit &a = pair.driver[i], &b = pair.software[i];
+            SCOPED_TRACE(i);
+            found += a.kind != 0;
+            EXPECT_EQ(a.tmin, b.tmin);
+            EXPECT_EQ(a.origin.w, b.origin.w);
+            if (a.kind == 0 && b.kind == 0) continue;
+            if (a.kind != b.kind || a.instance != b.instance || a.geometry != b.geometry ||
+                a.primitive != b.primitive) {
+                const bool tied = a.kind && b.kind && std::abs(a.t - b.t) <= tolerance(scene, a) + tolerance(scene, b);
+                EXPECT_TRUE(tied || nearEdge(a) || nearEdge(b))
+                    << a.kind << " " << a.instance << " " << a.geometry << " " << a.primitive << " " << a.t
+                    << " against " << b.kind << " " << b.instance << " " << b.geometry << " " << b.primitive << " "
+                    << b.t;
+                apart++;
+                continue;
+            }
+            EXPECT_EQ(a.front, b.front);
+            EXPECT_EQ(a.data, b.data);
+            EXPECT_EQ(a.record, b.record);
+            EXPECT_NEAR(a.t, b.t, tolerance(scene, a));
+            // Of two roundings of the same products of numbers below 10.
+            for (int k = 0; k < 3; k++) {
+                EXPECT_NEAR(a.origin[k], b.origin[k], 1e-5);
+                EXPECT_NEAR(a.direction[k], b.direction[k], 1e-5);
+            }
+            for (int column = 0; column < 4; column++)
+                for (int row = 0; row < 3; row++) {
+                    EXPECT_EQ(a.to_world[column][row], b.to_world[column][row]);
+                    EXPECT_NEAR(a.to_object[column][row], b.to_object[column][row], 1e-5);
+                }
+        }
+        EXPECT_LE(apart, pair.driver.size() / 100);
+        return found;
+    }
+
+    void TearDown() override {
+        driver_ = {};
+        software_ = {};
+        ConformanceTest::TearDown();
+    }
+
+    Kernel driver_, software_;
+};
+
+}  // namespace
+
+TEST_F(RewriteGpuTest, TrianglesWithEveryFlag) {
+    const std::vector<Ray> rays = castRays(1000);
+    const Scene scene = triangles(1);
+    for (const uint32_t flags : {0u, ray_opaque, ray_no_opaque, ray_cull_back, ray_cull_front, ray_cull_opaque,
+                                 ray_cull_no_opaque, ray_opaque | ray_cull_back, ray_no_opaque | ray_cull_front}) {
+        SCOPED_TRACE(flags);
+        EXPECT_GT(expectSame(scene, compare(scene, rays, {flags, 1})), 50u);
+    }
+    EXPECT_EQ(expectSame(scene, compare(scene, rays, {ray_opaque | ray_cull_opaque, 1})), 0u);
+}
+
+TEST_F(RewriteGpuTest, CandidatesAreChosenByTheShader) {
+    const std::vector<Ray> rays = castRays(1000);
+    for (const uint32_t seed : {2u, 3u}) {
+        const Scene scene = triangles(seed);
+        for (const uint32_t confirm : {0u, 2u, 3u, 4u}) {
+            SCOPED_TRACE(confirm);
+            EXPECT_GT(expectSame(scene, compare(scene, rays, {0, confirm})), 100u);
+            EXPECT_EQ(expectSame(scene, compare(scene, rays, {ray_no_opaque, confirm})) > 100u, confirm != 0u);
+        }
+    }
+}
+
+TEST_F(RewriteGpuTest, FirstHitAndTermination) {
+    const std::vector<Ray> rays = castRays(600);
+    const Scene scene = triangles(4);
+    const Pair closest = compare(scene, rays, {0, 1}), first = compare(scene, rays, {ray_first, 1});
+    for (size_t i = 0; i < rays.size(); i++) {
+        if (nearEdge(closest.driver[i])) continue;
+        EXPECT_EQ(first.software[i].kind, closest.driver[i].kind) << i;
+        EXPECT_EQ(first.driver[i].kind, closest.driver[i].kind) << i;
+        EXPECT_GE(first.software[i].t, closest.software[i].t);
+    }
+    // Terminated at the first candidate: it is the only one, and nothing is committed among transparent surfaces.
+    const Pair ended = compare(scene, rays, {ray_no_opaque, 5});
+    size_t candidates = 0;
+    for (const Hit& hit : ended.software) {
+        EXPECT_LE(hit.candidates, 1u);
+        candidates += hit.candidates;
+        EXPECT_EQ(hit.kind, 0u);
+    }
+    EXPECT_GT(candidates, 50u);
+}
+
+TEST_F(RewriteGpuTest, BoxesAreGenerated) {
+    Random random(5);
+    Scene scene;
+    const std::vector<float> boxes = randomBoxes(random, 30);
+    scene.bottoms.push_back({{{{}, boxes}}, true});
+    scene.bottoms.push_back({{{soup(random, 12), {}}}, false});
+    place(scene, 0, translate({0.3f, 0, 0}) * rotateX(40));
+    place(scene, 1, rotateY(70));
+    place(scene, 0, translate({-1, 1, 0}) * scale({0.5f, 1.5f, 0.7f}), 0x0f);
+    const std::vector<Ray> rays = castRays(800);
+    for (const uint32_t flags : {0u, ray_opaque, ray_cull_no_opaque, ray_no_opaque}) {
+        SCOPED_TRACE(flags);
+        EXPECT_GT(expectSame(scene, compare(scene, rays, {flags, 1, boxes})), 100u);
+    }
+}
+
+TEST_F(RewriteGpuTest, SkippedKindsOfPrimitives) {
+    // Drivers want a pipeline flag for these, so that only the software engine is asked.
+    Random random(6);
+    Scene scene;
+    const std::vector<float> boxes = randomBoxes(random, 10);
+    scene.bottoms.push_back({{{{}, boxes}}, true});
+    scene.bottoms.push_back({{{soup(random, 20), {}}}, true});
+    place(scene, 0, rotateX(40));
+    place(scene, 1, rotateY(70));
+    const std::vector<Ray> rays = castRays(400);
+    std::vector<uint32_t> words;
+    const std::array<uint32_t, 4> reference = {encode(scene, words), 0, 0, 0};
+    const Buffer buffer = makeBuffer(words);
+    const Kernel kernel = softwareKernel(std::string(declarations) + std::string(simple));
+    const auto kinds = [&](uint32_t flags) {
+        std::set<uint32_t> found;
+        for (const Hit& hit : run(kernel, rays, {flags, 1, boxes}, [&](Compute& list) {
+                 list.setUniform(Slot::at(0, 0), reference);
+                 list.setStorageBuffer(Slot::at(7, 0), buffer);
+             }))
+            found.insert(hit.kind);
+        return found;
+    };
+    EXPECT_EQ(kinds(0), (std::set<uint32_t>{0, 1, 2}));
+    EXPECT_EQ(kinds(ray_skip_triangles), (std::set<uint32_t>{0, 2}));
+    EXPECT_EQ(kinds(ray_skip_boxes), (std::set<uint32_t>{0, 1}));
+    EXPECT_EQ(kinds(ray_skip_boxes | ray_skip_triangles), (std::set<uint32_t>{0}));
+}
+
+// Structures in an array by a varying index, as parameters and from an address; queries in an array, two at once, one
+// of the module, through a chain of calls: each must give what one plain query gives.
+TEST_F(RewriteGpuTest, FormsOfStructuresAndQueries) {
+    const std::array<Scene, 2> scenes = {triangles(7), triangles(8)};
+    const std::vector<Ray> rays = castRays(500);
+    std::vector<uint32_t> words = {0, 0, 0, 0, 0};
+    std::array<uint32_t, 2> tops = {};
+    for (size_t i = 0; i < 2; i++) tops[i] = encode(scenes[i], words);
+    const Buffer buffer = makeBuffer(words);
+    const std::array<uint32_t, 4> one = {tops[1], 0, 0, 0};
+    const std::array<uint32_t, 12> many = {~0u, 0, 0, 0, tops[0], 0, 0, 0, tops[1], 0, 0, 0};
+    const auto bind = [&](Compute& list) {
+        list.setUniform(Slot::at(0, 0), one);
+        list.setStorageBuffer(Slot::at(7, 0), buffer);
+    };
+    const Kernel plain = softwareKernel(std::string(declarations) + std::string(simple));
+    const std::vector<Hit> expected = run(plain, rays, {}, bind);
+    const auto expectEqual = [&](const char* name, std::string_view text, bool with_array) {
+        SCOPED_TRACE(name);
+        const Kernel kernel = softwareKernel(std::string(declarations) + std::string(text));
+        const auto t0 = std::chrono::steady_clock::now();
+        const std::vector<Hit> hits = run(kernel, rays, {}, [&](Compute& list) {
+            if (with_array)
+                list.setUniform(Slot::at(0, 0), many);
+            else
+                list.setUniform(Slot::at(0, 0), one);
+            list.setStorageBuffer(Slot::at(7, 0), buffer);
+        });
+        std::fprintf(stderr, "%s %.2f\n", name,
+                     std::chrono::duration<double>(std::chrono::steady_clock::now() - t0).count());
+        ASSERT_EQ(hits.size(), expected.size());
+        for (size_t i = 0; i < hits.size(); i++)
+            EXPECT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0)
+                << i << " " << hits[i].t << " " << expected[i].t;
+    };
+    const std::string head =
+        "layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;\n#define RAY flags, rays[i].mask, "
+        "rays[i].origin, 0.0, "
+        "rays[i].direction, rays[i].maximum\n#define BEGIN uint i = gl_GlobalInvocationID.x; if (i >= count) return;\n";
+    const std::string array =
+        "layout(set = 0, binding = 0) uniform accelerationStructureEXT scenes[3];\n" + head.substr(head.find('\n') + 1);
+    expectEqual("array",
+                array + "void main() { BEGIN rayQueryEXT q; rayQueryInitializeEXT(q, scenes[nonuniformEXT(2u + (i & "
+                        "1u) * (flags & 1u))], RAY); hits[i] = describe(q, finish(q)); }",
+                true);
+    expectEqual("array, every element in turn", array + R"(void main() { BEGIN rayQueryEXT q[3]; uint n[3];
+        for (uint k = 0u; k < 3u; k++) { rayQueryInitializeEXT(q[k], scenes[k], RAY); n[k] = 0u; }
+        for (uint k = 0u; k < 3u; k++) while (rayQueryProceedEXT(q[k])) { n[k]++; rayQueryConfirmIntersectionEXT(q[k]); }
+        rayQueryEXT p; rayQueryInitializeEXT(p, scenes[2], RAY); hits[i] = describe(p, finish(p));
+        hits[i].t = rayQueryGetIntersectionTypeEXT(q[2], true) == 0u ? 0.0 : rayQueryGetIntersectionTEXT(q[2], true); hits[i].candidates = n[2]; })",
+                true);
+    expectEqual(
+        "parameters",
+        array +
+            R"(Hit three(rayQueryEXT q, uint n) { return describe(q, n); } Hit two(rayQueryEXT q) { return three(q, finish(q)); }
+        Hit one(accelerationStructureEXT s, uint i) { rayQueryEXT q; rayQueryInitializeEXT(q, s, RAY); return two(q); }
+        Hit zero(accelerationStructureEXT s[3], uint k, uint i) { return one(s[k], i); }
+        void main() { BEGIN hits[i] = zero(scenes, 2u - flags, i); })",
+        true);
+    expectEqual(
+        "two at once",
+        array +
+            R"(void main() { BEGIN rayQueryEXT q, p; rayQueryInitializeEXT(q, scenes[2], RAY); rayQueryInitializeEXT(p, scenes[1], RAY);
+        uint n = 0u; while (rayQueryProceedEXT(q)) { n++; rayQueryProceedEXT(p); rayQueryConfirmIntersectionEXT(q); } hits[i] = describe(q, n); })",
+        true);
+    expectEqual("of the module", head + R"(rayQueryEXT q; void start(uint i) { rayQueryInitializeEXT(q, scene, RAY); }
+        uint loop() { uint n = 0u; while (rayQueryProceedEXT(q)) { n++; rayQueryConfirmIntersectionEXT(q); } return n; }
+        void main() { BEGIN start(i); hits[i] = describe(q, loop()); })",
+                false);
+    expectEqual("from an address",
+                head + "void main() { BEGIN rayQueryEXT q; rayQueryInitializeEXT(q, accelerationStructureEXT(uvec2(" +
+                    std::to_string(tops[1]) +
+                    "u, 0u)), RAY); rayQueryEXT unused; rayQueryInitializeEXT(unused, scene, RAY); hits[i] = "
+                    "describe(q, finish(q)); }",
+                false);
+}
+
+// A whole fragment shader: a picture from either engine.
+TEST_F(RewriteGpuTest, FragmentShader) {
+    if (!device.getFeatures().fragmentTracing) GTEST_SKIP() << "no ray queries in fragment shaders";
+    const std::string text = R"(
+layout(set = 2, binding = 3) uniform accelerationStructureEXT scene;
+layout(location = 0) out vec4 color;
+void main() {
+    rayQueryEXT q;
+    rayQueryInitializeEXT(q, scene, gl_RayFlagsOpaqueEXT, 0xff, vec3((gl_FragCoord.xy / 64.0 - 0.5) * 5.0, 5.0), 0.0, vec3(0.0, 0.0, -1.0), 100.0);
+    rayQueryProceedEXT(q);
+    if (rayQueryGetIntersectionTypeEXT(q, true) == gl_RayQueryCommittedIntersectionNoneEXT) MISS;
+    color = vec4(rayQueryGetIntersectionBarycentricsEXT(q, true), float(rayQueryGetIntersectionInstanceIdEXT(q, true)) / 8.0, 1.0);
+})";
+    const Scene scene = triangles(9);
+    const Tracing top = build(scene);
+    std::vector<uint32_t> words;
+    const std::array<uint32_t, 4> reference = {encode(scene, words), 0, 0, 0};
+    const Buffer buffer = makeBuffer(words);
+    const auto picture = [&](bool software) {
+        Pipeline pipeline = device.createPipeline("pipeline");
+        pipeline.createShaderGLSL(Shader::TypeVertex, cover_vertex);
+        if (software)
+            pipeline.setShader(
+                softwareShader("#define MISS discard\n" + text, ShaderStage::Fragment, Shader::TypeFragment));
+        else
+            // Mesa 25.0.7 crashes in a shader that discards after a query of its own.
+            pipeline.createShaderGLSL(Shader::TypeFragment,
+                                      "#define MISS { color = vec4(0.0, 0.0, 0.0, 1.0); return; }\n" + text);
+        pipeline.setColorFormat(FormatRGBAu8n);
+        EXPECT_THAT(pipeline.create(), IsOk());
+        const Texture target = makeTexture(FormatRGBAu8n, 64, 64, Texture::FlagTarget);
+        draw(target, [&](Command& list) {
+            list.setPipeline(pipeline);
+            if (software) {
+                list.setUniform(Slot::at(2, 3), reference);
+                list.setStorageBuffer(Slot::at(7, 0), buffer);
+            } else {
+                list.setTracing(0, top);
+            }
+            list.drawArrays(3);
+        });
+        return readTexture<Pixel>(target);
+    };
+    const std::vector<Pixel> driver = picture(false), software = picture(true);
+    size_t different = 0;
+    for (size_t i = 0; i < driver.size(); i++)
+        for (size_t k = 0; k < 4; k++)
+            if (std::abs(int(driver[i][k]) - int(software[i][k])) > 1) {
+                different++;
+                break;
+            }
+    EXPECT_GT(driver.size() - countPixels(driver, black), 500u);
+    // Pixels whose ray passes an edge.
+    EXPECT_LE(different, 20u);
+}
+
+}  // namespace glint::test

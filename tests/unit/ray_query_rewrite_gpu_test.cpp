@@ -8,10 +8,9 @@
 #include <glint/shader/shader_compiler.h>
 
 #include <bit>
-#include <chrono>
 #include <cmath>
-#include <cstring>
 #include <set>
+#include <tuple>
 
 namespace glint::test {
 
@@ -59,11 +58,12 @@ Hit describe(rayQueryEXT q, uint candidates) {
     hit.to_world = hit.to_object = mat4(0.0);
     if (hit.kind == gl_RayQueryCommittedIntersectionNoneEXT) return hit;
     hit.instance = uint(rayQueryGetIntersectionInstanceIdEXT(q, true));
+    hit.t = rayQueryGetIntersectionTEXT(q, true);
+    hit.primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(q, true));
+#ifndef BRIEF
     hit.data = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(q, true));
     hit.geometry = uint(rayQueryGetIntersectionGeometryIndexEXT(q, true));
-    hit.primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(q, true));
     hit.record = rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(q, true);
-    hit.t = rayQueryGetIntersectionTEXT(q, true);
     hit.origin = vec4(rayQueryGetIntersectionObjectRayOriginEXT(q, true), hit.origin.w);
     hit.direction = vec4(rayQueryGetIntersectionObjectRayDirectionEXT(q, true), 0.0);
     hit.to_world = mat4(rayQueryGetIntersectionObjectToWorldEXT(q, true));
@@ -72,6 +72,7 @@ Hit describe(rayQueryEXT q, uint candidates) {
         hit.barycentrics = rayQueryGetIntersectionBarycentricsEXT(q, true);
         hit.front = rayQueryGetIntersectionFrontFaceEXT(q, true) ? 1u : 0u;
     }
+#endif
     return hit;
 }
 
@@ -347,14 +348,18 @@ protected:
         return read<Hit>(hits);
     }
 
+    void prepare() {
+        if (!driver_) driver_ = driverKernel(std::string(declarations) + std::string(simple));
+        if (!software_) software_ = softwareKernel(std::string(declarations) + std::string(simple));
+    }
+
     /// Both engines on one scene.
     struct Pair {
         std::vector<Hit> driver, software;
     };
 
     Pair compare(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
-        if (!driver_) driver_ = driverKernel(std::string(declarations) + std::string(simple));
-        if (!software_) software_ = softwareKernel(std::string(declarations) + std::string(simple));
+        prepare();
         const Tracing top = build(scene);
         std::vector<uint32_t> words;
         const std::array<uint32_t, 4> reference = {encode(scene, words), 0, 0, 0};
@@ -437,13 +442,13 @@ protected:
         return found;
     }
 
-    void TearDown() override {
+    static void TearDownTestSuite() {
         driver_ = {};
         software_ = {};
-        ConformanceTest::TearDown();
     }
 
-    Kernel driver_, software_;
+    // Compiled once: the driver takes a second for it.
+    static inline Kernel driver_, software_;
 };
 
 }  // namespace
@@ -521,10 +526,10 @@ TEST_F(RewriteGpuTest, SkippedKindsOfPrimitives) {
     std::vector<uint32_t> words;
     const std::array<uint32_t, 4> reference = {encode(scene, words), 0, 0, 0};
     const Buffer buffer = makeBuffer(words);
-    const Kernel kernel = softwareKernel(std::string(declarations) + std::string(simple));
+    prepare();
     const auto kinds = [&](uint32_t flags) {
         std::set<uint32_t> found;
-        for (const Hit& hit : run(kernel, rays, {flags, 1, boxes}, [&](Compute& list) {
+        for (const Hit& hit : run(software_, rays, {flags, 1, boxes}, [&](Compute& list) {
                  list.setUniform(Slot::at(0, 0), reference);
                  list.setStorageBuffer(Slot::at(7, 0), buffer);
              }))
@@ -537,81 +542,74 @@ TEST_F(RewriteGpuTest, SkippedKindsOfPrimitives) {
     EXPECT_EQ(kinds(ray_skip_boxes | ray_skip_triangles), (std::set<uint32_t>{0}));
 }
 
-// Structures in an array by a varying index, as parameters and from an address; queries in an array, two at once, one
-// of the module, through a chain of calls: each must give what one plain query gives.
+// Structures in an array, as parameters and from an address; queries in an array, several at once, one of the module,
+// in a chain of calls: each gives what one plain query gives.
 TEST_F(RewriteGpuTest, FormsOfStructuresAndQueries) {
     const std::array<Scene, 2> scenes = {triangles(7), triangles(8)};
-    const std::vector<Ray> rays = castRays(500);
+    const std::vector<Ray> rays = castRays(300);
     std::vector<uint32_t> words = {0, 0, 0, 0, 0};
     std::array<uint32_t, 2> tops = {};
     for (size_t i = 0; i < 2; i++) tops[i] = encode(scenes[i], words);
     const Buffer buffer = makeBuffer(words);
     const std::array<uint32_t, 4> one = {tops[1], 0, 0, 0};
     const std::array<uint32_t, 12> many = {~0u, 0, 0, 0, tops[0], 0, 0, 0, tops[1], 0, 0, 0};
-    const auto bind = [&](Compute& list) {
-        list.setUniform(Slot::at(0, 0), one);
-        list.setStorageBuffer(Slot::at(7, 0), buffer);
-    };
-    const Kernel plain = softwareKernel(std::string(declarations) + std::string(simple));
-    const std::vector<Hit> expected = run(plain, rays, {}, bind);
-    const auto expectEqual = [&](const char* name, std::string_view text, bool with_array) {
-        SCOPED_TRACE(name);
-        const Kernel kernel = softwareKernel(std::string(declarations) + std::string(text));
-        const auto t0 = std::chrono::steady_clock::now();
-        const std::vector<Hit> hits = run(kernel, rays, {}, [&](Compute& list) {
-            if (with_array)
-                list.setUniform(Slot::at(0, 0), many);
-            else
-                list.setUniform(Slot::at(0, 0), one);
+    const auto trace = [&](const Kernel& kernel, const auto& references) {
+        return run(kernel, rays, {}, [&](Compute& list) {
+            list.setUniform(Slot::at(0, 0), references);
             list.setStorageBuffer(Slot::at(7, 0), buffer);
         });
-        std::fprintf(stderr, "%s %.2f\n", name,
-                     std::chrono::duration<double>(std::chrono::steady_clock::now() - t0).count());
-        ASSERT_EQ(hits.size(), expected.size());
-        for (size_t i = 0; i < hits.size(); i++)
-            EXPECT_EQ(std::memcmp(&hits[i], &expected[i], sizeof(Hit)), 0)
-                << i << " " << hits[i].t << " " << expected[i].t;
     };
-    const std::string head =
-        "layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;\n#define RAY flags, rays[i].mask, "
-        "rays[i].origin, 0.0, "
-        "rays[i].direction, rays[i].maximum\n#define BEGIN uint i = gl_GlobalInvocationID.x; if (i >= count) return;\n";
-    const std::string array =
-        "layout(set = 0, binding = 0) uniform accelerationStructureEXT scenes[3];\n" + head.substr(head.find('\n') + 1);
-    expectEqual("array",
-                array + "void main() { BEGIN rayQueryEXT q; rayQueryInitializeEXT(q, scenes[nonuniformEXT(2u + (i & "
-                        "1u) * (flags & 1u))], RAY); hits[i] = describe(q, finish(q)); }",
-                true);
-    expectEqual("array, every element in turn", array + R"(void main() { BEGIN rayQueryEXT q[3]; uint n[3];
-        for (uint k = 0u; k < 3u; k++) { rayQueryInitializeEXT(q[k], scenes[k], RAY); n[k] = 0u; }
-        for (uint k = 0u; k < 3u; k++) while (rayQueryProceedEXT(q[k])) { n[k]++; rayQueryConfirmIntersectionEXT(q[k]); }
-        rayQueryEXT p; rayQueryInitializeEXT(p, scenes[2], RAY); hits[i] = describe(p, finish(p));
-        hits[i].t = rayQueryGetIntersectionTypeEXT(q[2], true) == 0u ? 0.0 : rayQueryGetIntersectionTEXT(q[2], true); hits[i].candidates = n[2]; })",
-                true);
-    expectEqual(
-        "parameters",
-        array +
-            R"(Hit three(rayQueryEXT q, uint n) { return describe(q, n); } Hit two(rayQueryEXT q) { return three(q, finish(q)); }
+    prepare();
+    const std::vector<Hit> expected = trace(software_, one);
+    const std::string head = "#define BRIEF\n" + std::string(declarations) + R"(
+#define RAY flags, rays[i].mask, rays[i].origin, 0.0, rays[i].direction, rays[i].maximum
+#define BEGIN uint i = gl_GlobalInvocationID.x; if (i >= count) return;
+layout(set = 0, binding = 0) uniform accelerationStructureEXT )";
+    const auto expectEqual = [&](const std::string& text, const auto& references) {
+        SCOPED_TRACE(text);
+        const std::vector<Hit> hits = trace(softwareKernel(head + text), references);
+        ASSERT_EQ(hits.size(), expected.size());
+        size_t found = 0;
+        for (size_t i = 0; i < hits.size(); i++) {
+            const Hit &a = hits[i], &b = expected[i];
+            EXPECT_EQ(std::tuple(a.kind, a.instance, a.primitive, a.candidates, a.t, a.tmin),
+                      std::tuple(b.kind, b.instance, b.primitive, b.candidates, b.t, b.tmin))
+                << i;
+            found += a.kind != 0;
+        }
+        EXPECT_GT(found, hits.size() / 10);
+    };
+    expectEqual(R"(scenes[3];
+        void main() { BEGIN rayQueryEXT q[3]; uint n[3];
+            for (uint k = 0u; k < 3u; k++) { rayQueryInitializeEXT(q[k], scenes[k], RAY); n[k] = 0u; }
+            for (uint k = 0u; k < 3u; k++)
+                while (rayQueryProceedEXT(q[k])) { n[k]++; rayQueryConfirmIntersectionEXT(q[k]); }
+            rayQueryEXT none; rayQueryInitializeEXT(none, scenes[0], RAY);
+            Hit hit = describe(none, n[2]);
+            hit.kind = rayQueryGetIntersectionTypeEXT(q[2], true);
+            if (hit.kind != 0u) {
+                hit.instance = uint(rayQueryGetIntersectionInstanceIdEXT(q[2], true));
+                hit.t = rayQueryGetIntersectionTEXT(q[2], true);
+                hit.primitive = uint(rayQueryGetIntersectionPrimitiveIndexEXT(q[2], true));
+            }
+            hits[i] = hit; })",
+                many);
+    expectEqual(R"(scenes[3];
+        Hit three(rayQueryEXT q, uint n) { return describe(q, n); }
+        Hit two(rayQueryEXT q) { return three(q, finish(q)); }
         Hit one(accelerationStructureEXT s, uint i) { rayQueryEXT q; rayQueryInitializeEXT(q, s, RAY); return two(q); }
         Hit zero(accelerationStructureEXT s[3], uint k, uint i) { return one(s[k], i); }
-        void main() { BEGIN hits[i] = zero(scenes, 2u - flags, i); })",
-        true);
-    expectEqual(
-        "two at once",
-        array +
-            R"(void main() { BEGIN rayQueryEXT q, p; rayQueryInitializeEXT(q, scenes[2], RAY); rayQueryInitializeEXT(p, scenes[1], RAY);
-        uint n = 0u; while (rayQueryProceedEXT(q)) { n++; rayQueryProceedEXT(p); rayQueryConfirmIntersectionEXT(q); } hits[i] = describe(q, n); })",
-        true);
-    expectEqual("of the module", head + R"(rayQueryEXT q; void start(uint i) { rayQueryInitializeEXT(q, scene, RAY); }
+        void main() { BEGIN hits[i] = zero(scenes, nonuniformEXT(2u - (flags & i)), i); })",
+                many);
+    expectEqual(R"(scene;
+        rayQueryEXT q;
+        void start(accelerationStructureEXT s, uint i) { rayQueryInitializeEXT(q, s, RAY); }
         uint loop() { uint n = 0u; while (rayQueryProceedEXT(q)) { n++; rayQueryConfirmIntersectionEXT(q); } return n; }
-        void main() { BEGIN start(i); hits[i] = describe(q, loop()); })",
-                false);
-    expectEqual("from an address",
-                head + "void main() { BEGIN rayQueryEXT q; rayQueryInitializeEXT(q, accelerationStructureEXT(uvec2(" +
-                    std::to_string(tops[1]) +
-                    "u, 0u)), RAY); rayQueryEXT unused; rayQueryInitializeEXT(unused, scene, RAY); hits[i] = "
-                    "describe(q, finish(q)); }",
-                false);
+        void main() { BEGIN start(scene, i);
+            if ((i & 1u) == 0u) rayQueryInitializeEXT(q, accelerationStructureEXT(uvec2()" +
+                    std::to_string(tops[1]) + R"(u, 0u)), RAY);
+            uint n = loop(); hits[i] = describe(q, n); })",
+                one);
 }
 
 // A whole fragment shader: a picture from either engine.

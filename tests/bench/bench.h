@@ -58,6 +58,8 @@ Benchmark warmFrameBenchmark();
 Benchmark tracingFrameBenchmark();
 Benchmark startupBenchmark();
 Benchmark memoryBenchmark();
+Benchmark tracingSoftwareBenchmark();
+Benchmark tracingBuildBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

@@ -50,7 +50,8 @@ int main(int argc, char** argv) {
     int failed = 0;
     int found = 0;
     const Benchmark benchmarks[] = {dispatchBenchmark(),     drawBenchmark(),    warmFrameBenchmark(),
-                                    tracingFrameBenchmark(), startupBenchmark(), memoryBenchmark()};
+                                    tracingFrameBenchmark(), startupBenchmark(), memoryBenchmark(),
+                                    tracingSoftwareBenchmark(), tracingBuildBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

@@ -1,0 +1,179 @@
+// A kernel that finds the closest hits of rays in a buffer. GLINT_TRACING_REFILL 0: each lane traces one ray, best for
+// rays that go the same way; 1: of GLINT_TRACING_RAYS rays a lane, lanes that are done take the next ones, best for rays
+// that do not. It takes a thread for each ray, or one for each GLINT_TRACING_RAYS of them.
+//
+// The slots: texel buffer 0 (or what GLINT_TRACING_MEMORY says), uniform 0, storage 0 and 1: rays and hits.
+#pragma once
+
+#include <glint/tracing/memory.h>
+#include <glint/tracing/traversal.h>
+
+#ifndef GLINT_TRACING_REFILL
+#define GLINT_TRACING_REFILL 0
+#endif
+#ifndef GLINT_TRACING_RAYS
+#define GLINT_TRACING_RAYS 16
+#endif
+#if GLINT_TRACING_REFILL
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+#endif
+
+layout(local_size_x = 64) in;
+
+struct GlintRay {
+    vec3 origin;
+    float t_min;
+    vec3 direction;
+    float t_max;
+};
+
+struct GlintHit {
+    float t;  // infinity if there is none
+    uint primitive;
+    uint geometry;
+    float u;  // of the second corner
+    float v;  // of the third
+    uint front;
+    uint instance;
+    uint unused;
+};
+
+layout(set = 0, binding = 1) uniform GlintBatch {
+    uint ray_count;
+    uint hierarchy;  // first texel
+};
+layout(set = 0, binding = 2) readonly buffer GlintRays { GlintRay rays[]; };
+layout(set = 0, binding = 3) writeonly buffer GlintHits { GlintHit hits[]; };
+
+// A ray on its way.
+struct GlintWay {
+    GlintSpace space;
+    float t_min;
+    float t_max;  // of the closest hit so far
+    GlintTriangleHit best;
+    bool found;
+    uint node;      // whose children are in `list`
+    uvec2 header;   // its words 2 and 3
+    uint list;      // what is left of them after `slot`
+    int near;       // where the first of `list` begins at the earliest
+    uint slot;      // the child to go to, NONE at the end
+    uint stacked;
+};
+
+uint stack_nodes[GLINT_TRACING_STACK];
+uint stack_lists[GLINT_TRACING_STACK];
+int stack_nears[GLINT_TRACING_STACK];
+
+bool glintAtNode(GlintWay way) { return way.slot != GLINT_TRACING_NONE && !glintIsLeaf(way.header, way.slot); }
+bool glintAtLeaf(GlintWay way) { return way.slot != GLINT_TRACING_NONE && glintIsLeaf(way.header, way.slot); }
+
+void glintBegin(uint index, out GlintWay way) {
+    const GlintRay ray = rays[index];
+    way.space = glintSpace(hierarchy, ray.origin, ray.direction);
+    way.t_min = max(ray.t_min, 0.0);
+    way.t_max = ray.t_max;
+    way.best = GlintTriangleHit(0.0, 1.0, vec3(0.0), 0u, 0u);
+    way.found = false;
+    way.node = 0u;
+    way.header = uvec2(0x100u, 0u);  // child 0 is node 1, the root
+    way.list = GLINT_TRACING_EMPTY;
+    way.near = 0;
+    way.slot = glintIsRay(ray.origin, ray.direction, ray.t_min, ray.t_max) ? 0u : GLINT_TRACING_NONE;
+    way.stacked = 0u;
+}
+
+// The next child: of this node, or of the last one that has children left which begin before the closest hit.
+void glintNext(inout GlintWay way) {
+    while (way.list == GLINT_TRACING_EMPTY && way.stacked > 0u) {
+        way.stacked--;
+        way.near = stack_nears[way.stacked];
+        if (way.near > floatBitsToInt(way.t_max)) continue;
+        way.list = stack_lists[way.stacked];
+        way.node = stack_nodes[way.stacked];
+        way.header = GLINT_TRACING_LOAD(way.space.base + 4u * way.node).zw;
+    }
+    way.slot = glintFirst(way.list);
+    way.list = glintRest(way.list);
+}
+
+void glintEnterNode(inout GlintWay way) {
+    // What is left of the node before waits on the stack.
+    if (way.list != GLINT_TRACING_EMPTY) {
+        stack_nodes[way.stacked] = way.node;
+        stack_lists[way.stacked] = way.list;
+        stack_nears[way.stacked] = way.near;
+        way.stacked++;
+    }
+    way.node = glintChildNode(way.header, way.slot);
+    way.list = glintNode(way.space, way.node, way.t_min, way.t_max, way.header, way.near);
+    glintNext(way);
+}
+
+void glintEnterLeaf(inout GlintWay way) {
+    GlintTriangleHit hit;
+    if (glintTriangle(way.space, glintChildRecord(way.header, way.slot), hit) && hit.t > way.t_min &&
+        (hit.t < way.t_max || way.found && hit.t == way.t_max && glintIsBefore(hit, way.best))) {
+        way.t_max = hit.t;
+        way.best = hit;
+        way.found = true;
+    }
+    glintNext(way);
+}
+
+void glintStore(uint ray, GlintWay way) {
+    const bool found = way.found;
+    hits[ray].t = found ? way.t_max : uintBitsToFloat(0x7f800000u);
+    hits[ray].primitive = found ? way.best.primitive : 0xffffffffu;
+    hits[ray].geometry = found ? way.best.geometry & 0x7fffffffu : 0xffffffffu;
+    hits[ray].u = found ? way.best.weights.y / way.best.area : 0.0;
+    hits[ray].v = found ? way.best.weights.z / way.best.area : 0.0;
+    hits[ray].front = found && way.best.area > 0.0 ? 1u : 0u;
+    hits[ray].instance = found ? 0u : 0xffffffffu;
+}
+
+#if GLINT_TRACING_REFILL == 0
+
+void main() {
+    const uint index = gl_GlobalInvocationID.x;
+    if (index >= ray_count) return;
+    GlintWay way;
+    glintBegin(index, way);
+    while (way.slot != GLINT_TRACING_NONE) {
+        while (glintAtNode(way)) glintEnterNode(way);
+        while (glintAtLeaf(way)) glintEnterLeaf(way);
+    }
+    glintStore(index, way);
+}
+
+#else
+
+void main() {
+    // A subgroup shares a run of rays: the next one goes to the lane that asks first.
+    const uint run = gl_SubgroupSize * GLINT_TRACING_RAYS;
+    uint next = (gl_WorkGroupID.x * gl_NumSubgroups + gl_SubgroupID) * run;
+    const uint end = min(ray_count, next + run);
+    uint index = 0xffffffffu;
+    GlintWay way;
+    way.slot = GLINT_TRACING_NONE;
+    for (;;) {
+        const bool idle = way.slot == GLINT_TRACING_NONE;
+        const uvec4 idles = subgroupBallot(idle);
+        const uint idle_count = subgroupBallotBitCount(idles);
+        const bool all_idle = idle_count == gl_SubgroupSize;
+        if (next < end ? idle_count * 3u >= gl_SubgroupSize : all_idle) {
+            if (idle) {
+                if (index < ray_count) glintStore(index, way);
+                index = next + subgroupBallotExclusiveBitCount(idles);
+                if (index >= end) index = 0xffffffffu;
+                if (index < end) glintBegin(index, way);
+            }
+            if (next >= end) return;
+            next += idle_count;
+        }
+        if (glintAtNode(way)) glintEnterNode(way);
+        if (glintAtLeaf(way)) glintEnterLeaf(way);
+    }
+}
+
+#endif

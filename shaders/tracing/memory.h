@@ -1,0 +1,54 @@
+// How a shader reads hierarchies: GLINT_TRACING_LOAD(i) is texel i, of 16 bytes. GLINT_TRACING_MEMORY picks the form:
+//
+//   GLINT_TRACING_TEXELS   a storage texel buffer: the cheapest on lavapipe
+//   GLINT_TRACING_STORAGE  storage buffers of 2^23 texels (128 MiB) each, GLINT_TRACING_BUFFERS of them: in every
+//                          language
+//   GLINT_TRACING_ADDRESS  a buffer address, in GLINT_TRACING_POINTER (a uvec2 that the shader has)
+//
+// at GLINT_TRACING_SET and GLINT_TRACING_BINDING.
+#pragma once
+
+#define GLINT_TRACING_TEXELS 0
+#define GLINT_TRACING_STORAGE 1
+#define GLINT_TRACING_ADDRESS 2
+
+#ifndef GLINT_TRACING_MEMORY
+#define GLINT_TRACING_MEMORY GLINT_TRACING_STORAGE
+#endif
+#ifndef GLINT_TRACING_SET
+#define GLINT_TRACING_SET 0
+#endif
+#ifndef GLINT_TRACING_BINDING
+#define GLINT_TRACING_BINDING 0
+#endif
+#ifndef GLINT_TRACING_BUFFERS
+#define GLINT_TRACING_BUFFERS 1
+#endif
+
+#if GLINT_TRACING_MEMORY == GLINT_TRACING_TEXELS
+layout(set = GLINT_TRACING_SET, binding = GLINT_TRACING_BINDING, rgba32ui) readonly uniform uimageBuffer glint_texels;
+#define GLINT_TRACING_LOAD(i) imageLoad(glint_texels, int(i))
+
+#elif GLINT_TRACING_MEMORY == GLINT_TRACING_STORAGE
+layout(set = GLINT_TRACING_SET, binding = GLINT_TRACING_BINDING) readonly buffer GlintTexels {
+    uvec4 texels[];
+} glint_texels[GLINT_TRACING_BUFFERS];
+#if GLINT_TRACING_BUFFERS == 1
+#define GLINT_TRACING_LOAD(i) glint_texels[0].texels[i]
+#else
+// A switch instead of a varying index: not every device can index buffers by what varies.
+uvec4 glintLoad(uint i) {
+    for (uint b = 0u; b < GLINT_TRACING_BUFFERS - 1; b++) {
+        if (i >> 23 == b) return glint_texels[b].texels[i & 0x7fffffu];
+    }
+    return glint_texels[GLINT_TRACING_BUFFERS - 1].texels[i - (uint(GLINT_TRACING_BUFFERS - 1) << 23)];
+}
+#define GLINT_TRACING_LOAD(i) glintLoad(i)
+#endif
+
+#elif GLINT_TRACING_MEMORY == GLINT_TRACING_ADDRESS
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+layout(buffer_reference, buffer_reference_align = 16) readonly buffer GlintTexels { uvec4 texels[]; };
+#define GLINT_TRACING_LOAD(i) GlintTexels(GLINT_TRACING_POINTER).texels[i]
+#endif

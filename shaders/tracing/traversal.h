@@ -1,0 +1,240 @@
+// Glint's own hierarchies in a shader: a ray against one of them, the tests of a node's boxes and of a triangle. For
+// what is built on this: batch.h and query.h. docs/tracing.md derives the bounds.
+//
+// GLINT_TRACING_LOAD(i) has to be defined before: see memory.h.
+#pragma once
+
+// Entries of the stack: a hierarchy has 24 levels at most, and the last one pushes nothing.
+#define GLINT_TRACING_STACK 23
+
+// The slot that ends a list of children, and a list of nothing else.
+#define GLINT_TRACING_NONE 15u
+#define GLINT_TRACING_EMPTY 0xffffffffu
+
+// A ray in the space of one hierarchy.
+struct GlintSpace {
+    uint base;        // the hierarchy's first texel
+    uint records;     // its first record's
+    uint scale_bits;  // of a plane's scale, less the exponent
+    float step;       // of the grid
+    vec3 origin;
+    vec3 to_grid;  // from the origin to the grid's minimum
+    vec3 inverse;  // of the direction, finite
+    vec3 margin;   // how far planes are moved apart, in t
+    vec3 shear_x;  // rows of the matrix that takes the direction to (0, 0, 1)
+    vec3 shear_y;
+    vec3 shear_z;
+};
+
+// False for a ray that means nothing, and meets nothing: NaN, infinity, no direction, an empty interval.
+bool glintIsRay(vec3 origin, vec3 direction, float t_min, float t_max) {
+    const vec3 most = vec3(3.0e38);
+    return all(lessThanEqual(abs(origin), most)) && all(lessThanEqual(abs(direction), most)) &&
+           any(greaterThan(abs(direction), vec3(1.2e-38))) && t_min <= t_max;
+}
+
+GlintSpace glintSpace(uint base, vec3 origin, vec3 direction) {
+    GlintSpace space;
+    const uvec4 grid = GLINT_TRACING_LOAD(base);
+    const uvec4 places = GLINT_TRACING_LOAD(base + 1u);
+    const vec3 low = uintBitsToFloat(GLINT_TRACING_LOAD(base + 2u).xyz);
+    const vec3 high = uintBitsToFloat(GLINT_TRACING_LOAD(base + 3u).xyz);
+    space.base = base;
+    space.scale_bits = places.x;
+    space.records = base + places.z;
+    space.step = uintBitsToFloat(grid.w);
+    space.origin = origin;
+    precise vec3 to_grid = uintBitsToFloat(grid.xyz) - origin;
+    space.to_grid = to_grid;
+
+    // How far any coordinate of the hierarchy is from the origin's. Rounding moves planes and corners by less than 2^-19
+    // of it.
+    const vec3 reaches = max(abs(low - origin), abs(high - origin));
+    const float reach = max(reaches.x, max(reaches.y, reaches.z));
+    const vec3 size = abs(direction);
+    const float largest = max(size.x, max(size.y, size.z));
+    // Making a smaller component that large moves the ray by less than rounding does, within reach.
+    const float least = max(largest * 9.0949470e-13, reach * 7.5231638e-37);  // 2^-40, 2^-120
+    const vec3 inverse = 1.0 / max(size, vec3(least));
+    space.inverse = uintBitsToFloat(floatBitsToUint(inverse) | (floatBitsToUint(direction) & 0x80000000u));
+    space.margin = inverse * (reach * 1.9073486e-6);
+
+    // The longest component's axis becomes z; the others follow it in turn, mirrored where it looks backwards, so that
+    // a triangle's winding stays.
+    precise vec3 slope;
+    vec3 x;
+    vec3 y;
+    vec3 z;
+    if (size.x >= size.y && size.x >= size.z) {
+        slope = direction / direction.x;
+        z = vec3(1.0 / direction.x, 0.0, 0.0);
+        x = vec3(-slope.y, 1.0, 0.0);
+        y = vec3(-slope.z, 0.0, 1.0);
+    } else if (size.y >= size.z) {
+        slope = direction / direction.y;
+        z = vec3(0.0, 1.0 / direction.y, 0.0);
+        x = vec3(0.0, -slope.z, 1.0);
+        y = vec3(1.0, -slope.x, 0.0);
+    } else {
+        slope = direction / direction.z;
+        z = vec3(0.0, 0.0, 1.0 / direction.z);
+        x = vec3(1.0, 0.0, -slope.x);
+        y = vec3(0.0, 1.0, -slope.y);
+    }
+    space.shear_x = x;
+    space.shear_y = z.x + z.y + z.z < 0.0 ? -y : y;
+    space.shear_z = z;
+    return space;
+}
+
+// A node's children that the ray meets between t_min >= 0 and t_max, nearest first: their slots, four bits each, ended
+// by NONE. `second` is where the second one begins at the earliest, `header` the node's words 2 and 3.
+#define GLINT_PLANE(word, shift) float((word) >> (shift) & 255u)
+#define GLINT_CHILD(s, nx, fx, ny, fy, nz, fz, shift)                                                        \
+    int key##s;                                                                                              \
+    {                                                                                                        \
+        const int tx0 = floatBitsToInt(GLINT_PLANE(nx, shift) * scale.x + near.x);                           \
+        const int ty0 = floatBitsToInt(GLINT_PLANE(ny, shift) * scale.y + near.y);                           \
+        const int tz0 = floatBitsToInt(GLINT_PLANE(nz, shift) * scale.z + near.z);                           \
+        const int tx1 = floatBitsToInt(GLINT_PLANE(fx, shift) * scale.x + far.x);                            \
+        const int ty1 = floatBitsToInt(GLINT_PLANE(fy, shift) * scale.y + far.y);                            \
+        const int tz1 = floatBitsToInt(GLINT_PLANE(fz, shift) * scale.z + far.z);                            \
+        const int t0 = max(max(tx0, ty0), max(tz0, first));                                                  \
+        const int t1 = min(min(tx1, ty1), min(tz1, last));                                                   \
+        key##s = t0 <= t1 && s < children ? (t0 & ~15) | s : 0x7fffffff;                                     \
+    }
+#define GLINT_SORT(a, b)                          \
+    {                                             \
+        const int smaller = min(key##a, key##b);  \
+        key##b = max(key##a, key##b);             \
+        key##a = smaller;                         \
+    }
+
+uint glintNode(GlintSpace space, uint node, float t_min, float t_max, out uvec2 header, out int second) {
+    const uint texel = space.base + 4u * node;
+    const uvec4 head = GLINT_TRACING_LOAD(texel);
+    const uvec4 planes_x = GLINT_TRACING_LOAD(texel + 1u);
+    const uvec4 planes_y = GLINT_TRACING_LOAD(texel + 2u);
+    const uvec4 planes_z = GLINT_TRACING_LOAD(texel + 3u);
+    header = head.zw;
+
+    const uvec3 exponents = uvec3(head.x << 3, head.y << 3, head.w << 19) & 0x07800000u;
+    const uvec3 origin = uvec3(head.xy & 0xfffffu, head.x >> 24 | head.y >> 24 << 8 | (head.w & 15u) << 16);
+    const vec3 scale = uintBitsToFloat(exponents + space.scale_bits) * space.inverse;
+    const vec3 corner = (vec3(origin) * space.step + space.to_grid) * space.inverse;
+    const vec3 near = corner - space.margin;
+    const vec3 far = corner + space.margin;
+
+    const bvec3 back = lessThan(space.inverse, vec3(0.0));
+    const uvec2 near_x = back.x ? planes_x.zw : planes_x.xy;
+    const uvec2 far_x = back.x ? planes_x.xy : planes_x.zw;
+    const uvec2 near_y = back.y ? planes_y.zw : planes_y.xy;
+    const uvec2 far_y = back.y ? planes_y.xy : planes_y.zw;
+    const uvec2 near_z = back.z ? planes_z.zw : planes_z.xy;
+    const uvec2 far_z = back.z ? planes_z.xy : planes_z.zw;
+
+    // Floats that are not negative are ordered as their bits are; a negative far end is below any near one, as it should
+    // be, and a negative near one below t_min.
+    const int first = floatBitsToInt(t_min);
+    const int last = floatBitsToInt(t_max);
+    const int children = int(head.z >> 4 & 15u);
+    GLINT_CHILD(0, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 0)
+    GLINT_CHILD(1, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 8)
+    GLINT_CHILD(2, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 16)
+    GLINT_CHILD(3, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 24)
+    GLINT_CHILD(4, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 0)
+    GLINT_CHILD(5, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 8)
+    GLINT_CHILD(6, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 16)
+    GLINT_CHILD(7, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 24)
+
+    GLINT_SORT(0, 2) GLINT_SORT(1, 3) GLINT_SORT(4, 6) GLINT_SORT(5, 7)
+    GLINT_SORT(0, 4) GLINT_SORT(1, 5) GLINT_SORT(2, 6) GLINT_SORT(3, 7)
+    GLINT_SORT(0, 1) GLINT_SORT(2, 3) GLINT_SORT(4, 5) GLINT_SORT(6, 7)
+    GLINT_SORT(2, 4) GLINT_SORT(3, 5)
+    GLINT_SORT(1, 4) GLINT_SORT(3, 6)
+    GLINT_SORT(1, 2) GLINT_SORT(3, 4) GLINT_SORT(5, 6)
+
+    second = key1 & ~15;
+    return uint(key0 & 15 | (key1 & 15) << 4 | (key2 & 15) << 8 | (key3 & 15) << 12 | (key4 & 15) << 16 |
+                (key5 & 15) << 20 | (key6 & 15) << 24 | key7 << 28);
+}
+
+uint glintFirst(uint list) { return list & 15u; }
+uint glintRest(uint list) { return list >> 4 | 0xf0000000u; }
+bool glintIsLeaf(uvec2 header, uint slot) { return slot < (header.x & 15u); }
+uint glintChildNode(uvec2 header, uint slot) { return ((header.x >> 8) + slot) & 0xffffffu; }
+uint glintChildRecord(uvec2 header, uint slot) { return (header.y >> 8) + slot; }
+
+// What is left of a product after rounding, exactly: Dekker's two-product.
+float glintProductError(float a, float b, float product) {
+    precise float split_a = 4097.0 * a;
+    precise float split_b = 4097.0 * b;
+    precise float a_high = split_a - (split_a - a);
+    precise float b_high = split_b - (split_b - b);
+    precise float a_low = a - a_high;
+    precise float b_low = b - b_high;
+    precise float error = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low;
+    return error;
+}
+
+// a.x * b.y - a.y * b.x where both products round to the same number: its sign is exact.
+float glintEqualProducts(vec2 a, vec2 b) {
+    precise float first = a.x * b.y;
+    precise float second = a.y * b.x;
+    precise float difference = glintProductError(a.x, b.y, first) - glintProductError(a.y, b.x, second);
+    return difference;
+}
+
+// Where a ray meets a triangle. `weights` of the corners, not divided by their sum `area`, which is positive if the
+// corners are counter-clockwise seen from the origin.
+struct GlintTriangleHit {
+    float t;
+    float area;
+    vec3 weights;
+    uint primitive;
+    uint geometry;  // and 2^31 if it is opaque
+};
+
+// True if the ray's line goes through the triangle, its edges and corners included: if the origin lies within the
+// sheared corners, whose rounding is the same for all triangles that share them. The signs are those of exact
+// arithmetic, so a closed mesh has no gaps.
+bool glintTriangle(GlintSpace space, uint record, out GlintTriangleHit hit) {
+    const uint texel = space.records + 3u * record;
+    const uvec4 texel0 = GLINT_TRACING_LOAD(texel);
+    const uvec4 texel1 = GLINT_TRACING_LOAD(texel + 1u);
+    const uvec4 texel2 = GLINT_TRACING_LOAD(texel + 2u);
+    hit.primitive = texel2.y;
+    hit.geometry = texel2.z;
+    precise vec3 a = uintBitsToFloat(texel0.xyz) - space.origin;
+    precise vec3 b = uintBitsToFloat(uvec3(texel0.w, texel1.xy)) - space.origin;
+    precise vec3 c = uintBitsToFloat(uvec3(texel1.zw, texel2.x)) - space.origin;
+    precise vec3 x = vec3(a.x, b.x, c.x) * space.shear_x.x + vec3(a.y, b.y, c.y) * space.shear_x.y +
+                     vec3(a.z, b.z, c.z) * space.shear_x.z;
+    precise vec3 y = vec3(a.x, b.x, c.x) * space.shear_y.x + vec3(a.y, b.y, c.y) * space.shear_y.y +
+                     vec3(a.z, b.z, c.z) * space.shear_y.z;
+    precise vec3 z = vec3(a.x, b.x, c.x) * space.shear_z.x + vec3(a.y, b.y, c.y) * space.shear_z.y +
+                     vec3(a.z, b.z, c.z) * space.shear_z.z;
+    precise float u = x.y * y.z - y.y * x.z;
+    precise float v = x.z * y.x - y.z * x.x;
+    precise float w = x.x * y.y - y.x * x.y;
+    if (u == 0.0 || v == 0.0 || w == 0.0) {
+        if (u == 0.0) u = glintEqualProducts(vec2(x.y, y.y), vec2(x.z, y.z));
+        if (v == 0.0) v = glintEqualProducts(vec2(x.z, y.z), vec2(x.x, y.x));
+        if (w == 0.0) w = glintEqualProducts(vec2(x.x, y.x), vec2(x.y, y.y));
+    }
+    const float smallest = min(u, min(v, w));
+    const float largest = max(u, max(v, w));
+    precise float area = u + v + w;
+    precise float t = (u * z.x + v * z.y + w * z.z) / area;
+    hit.t = t;
+    hit.area = area;
+    hit.weights = vec3(u, v, w);
+    return (smallest >= 0.0 || largest <= 0.0) && area != 0.0;
+}
+
+// The order of hits at the same distance.
+bool glintIsBefore(GlintTriangleHit a, GlintTriangleHit b) {
+    const uint geometry_a = a.geometry & 0x7fffffffu;
+    const uint geometry_b = b.geometry & 0x7fffffffu;
+    return geometry_a < geometry_b || (geometry_a == geometry_b && a.primitive < b.primitive);
+}

@@ -1,0 +1,237 @@
+// tracing.{bunny,100k,1m}.{camera,bounce}.software_over_embree1: rays a second of Glint's own engine over those of
+// Embree's rtcIntersect1 on two threads, in turns in one run. tracing.build.{quality,fast,refit}: millions of triangles
+// a second of the builders, on the 1m mesh.
+
+#include "bench/tracing_scenes.h"
+
+#include <glint/tracing/detail/hierarchy.h>
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+namespace glint::bench {
+
+namespace {
+
+using detail::BuildMode;
+using detail::Hierarchy;
+
+constexpr uint32_t rounds = 9;
+
+detail::TriangleGeometry geometryOf(const Mesh& mesh) {
+    detail::TriangleGeometry geometry;
+    geometry.positions = reinterpret_cast<const std::byte*>(mesh.positions.data());
+    geometry.vertices = static_cast<uint32_t>(mesh.positions.size());
+    geometry.indices = reinterpret_cast<const std::byte*>(mesh.indices.data());
+    geometry.index = detail::TriangleGeometry::Index::Uint32;
+    geometry.triangles = static_cast<uint32_t>(mesh.triangleCount());
+    return geometry;
+}
+
+Hierarchy build(const Mesh& mesh, BuildMode mode, ThreadPool* pool) {
+    const detail::TriangleGeometry geometry = geometryOf(mesh);
+    return std::move(*check(detail::buildHierarchy(std::span(&geometry, 1), mode, pool)));
+}
+
+/// As the kernel writes it.
+struct BatchHit {
+    RayHit hit;
+    uint32_t instance;
+    uint32_t unused;
+};
+
+/// A kernel over one set of rays.
+class Batch {
+public:
+    Batch(const Device& device, const Kernel& kernel, const Buffer& hierarchy, std::span<const Ray> rays)
+        : device_(device),
+          kernel_(kernel),
+          hierarchy_(hierarchy),
+          count_(static_cast<uint32_t>(rays.size())),
+          rays_(device_.createBuffer(Buffer::FlagStorage, rays)),
+          hits_(device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit))) {}
+
+    /// Returns seconds.
+    double trace(uint32_t threads) {
+        check(device_.finish());
+        const double begin = wallSeconds();
+        Compute compute = device_.createCompute();
+        compute.setKernel(kernel_);
+        compute.setUniform(0, std::array<uint32_t, 4>{count_, 0, 0, 0});
+        compute.setTexelBuffer(0, hierarchy_, FormatRGBAu32);
+        compute.setStorageBuffers(0, {rays_, hits_});
+        compute.dispatch(threads);
+        check(device_.submit(compute));
+        check(device_.finish());
+        return wallSeconds() - begin;
+    }
+
+    std::vector<RayHit> hits() {
+        const auto all = *check(device_.read<BatchHit>(hits_));
+        std::vector<RayHit> hits(all.size());
+        std::transform(all.begin(), all.end(), hits.begin(), [](const BatchHit& each) { return each.hit; });
+        return hits;
+    }
+
+private:
+    Device device_;
+    Kernel kernel_;
+    Buffer hierarchy_;
+    uint32_t count_;
+    Buffer rays_;
+    Buffer hits_;
+};
+
+/// Differences to Embree's robust answers.
+struct Differences {
+    uint32_t missed = 0;  ///< hits that only Embree has
+    uint32_t extra = 0;
+    uint32_t primitives = 0;
+    double largest = 0.0;  ///< relative difference in t
+
+    void print(const std::string& label) const {
+        fmt::print("  {}: against Embree robust {} missed, {} extra, {} other triangles, t within {:.1e}\n", label,
+                   missed, extra, primitives, largest);
+    }
+};
+
+Differences compare(std::span<const RayHit> ours, std::span<const RayHit> theirs) {
+    Differences differences;
+    for (size_t i = 0; i < ours.size(); i++) {
+        if (ours[i].isHit() != theirs[i].isHit()) {
+            (ours[i].isHit() ? differences.extra : differences.missed)++;
+            continue;
+        }
+        if (!ours[i].isHit()) continue;
+        differences.primitives += ours[i].primitive != theirs[i].primitive ? 1 : 0;
+        differences.largest = std::max(differences.largest, std::abs(double(ours[i].t) - theirs[i].t) / theirs[i].t);
+    }
+    return differences;
+}
+
+struct Variant {
+    std::string name;
+    std::string macros;
+    uint32_t rays_per_thread = 1;
+};
+
+Kernel createKernel(const Device& device, const Variant& variant) {
+    Device maker = device;
+    Kernel kernel = maker.createKernel();
+    kernel.createShaderGLSL("#include <glint/tracing/batch.h>\n", "GLINT_TRACING_MEMORY=0;" + variant.macros);
+    check(kernel.create());
+    return kernel;
+}
+
+/// Traces one set of rays by all variants and by Embree in turns. Returns seconds: Embree first.
+std::vector<Times> race(const Device& device, const Buffer& hierarchy, const TracingScene& scene, const char* kind,
+                        std::span<const Ray> rays, std::span<const Variant> variants, uint32_t turns) {
+    std::vector<Kernel> kernels;
+    std::vector<std::unique_ptr<Batch>> batches;
+    for (const Variant& variant : variants) {
+        kernels.push_back(createKernel(device, variant));
+        batches.push_back(std::make_unique<Batch>(device, kernels.back(), hierarchy, rays));
+    }
+    std::vector<RayHit> reference(rays.size());
+    EmbreeScene(scene.mesh, true).trace(rays, reference);
+    const EmbreeScene embree(scene.mesh, false);
+    std::vector<RayHit> hits(rays.size());
+    std::vector<Times> times(variants.size() + 1);
+    for (uint32_t turn = 0; turn <= turns; turn++) {
+        const double begin = wallSeconds();
+        embree.trace(rays, hits);
+        if (turn > 0) times[0].values.push_back(wallSeconds() - begin);
+        for (size_t i = 0; i < variants.size(); i++) {
+            // The driver compiles at the first dispatch, which is not timed.
+            const auto count = static_cast<uint32_t>(rays.size());
+            const double seconds =
+                batches[i]->trace((count + variants[i].rays_per_thread - 1) / variants[i].rays_per_thread);
+            if (turn > 0) times[i + 1].values.push_back(seconds);
+        }
+    }
+    const double million = static_cast<double>(rays.size()) * 1e-6;
+    fmt::print("  {} {}: Embree {:.2f} ({:.2f}) million rays a second, best (median)\n", scene.name, kind,
+               million / times[0].minimum(), million / times[0].median());
+    for (size_t i = 0; i < variants.size(); i++) {
+        fmt::print("    {:<24} {:.2f} ({:.2f}), over Embree {:.3f} ({:.3f})\n", variants[i].name,
+                   million / times[i + 1].minimum(), million / times[i + 1].median(),
+                   times[0].minimum() / times[i + 1].minimum(), times[0].median() / times[i + 1].median());
+        compare(batches[i]->hits(), reference).print("    " + variants[i].name);
+    }
+    std::fflush(stdout);
+    return times;
+}
+
+void runTracing(Report& report) {
+    const Device device = createDevice();
+    const Variant coherent = {"coherent", "GLINT_TRACING_REFILL=0"};
+    const Variant refill = {"refilling", "GLINT_TRACING_REFILL=1;GLINT_TRACING_RAYS=16", 16};
+    for (const char* name : {"bunny", "100k", "1m"}) {
+        const TracingScene scene = makeTracingScene(name);
+        const Hierarchy hierarchy = build(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
+        Device owner = device;
+        const Buffer buffer = owner.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
+        const auto camera = race(device, buffer, scene, "camera", scene.camera, std::span(&coherent, 1), rounds);
+        const auto bounce = race(device, buffer, scene, "bounce", scene.bounce, std::span(&refill, 1), rounds);
+        const std::string figure = fmt::format("tracing.{}.", name);
+        report.add(figure + "camera.software_over_embree1", camera[0].minimum() / camera[1].minimum(), "ratio",
+                   "Embree's rtcIntersect1 on two threads", deviceName(device));
+        report.add(figure + "bounce.software_over_embree1", bounce[0].minimum() / bounce[1].minimum(), "ratio",
+                   "Embree's rtcIntersect1 on two threads", deviceName(device));
+    }
+}
+
+void runBuilds(Report& report) {
+    const TracingScene scene = makeTracingScene("1m");
+    const detail::TriangleGeometry geometry = geometryOf(scene.mesh);
+    const double million = static_cast<double>(geometry.triangles) * 1e-6;
+    ThreadPool& pool = ThreadPool::shared();
+    Times quality;
+    Times fast;
+    Times refit;
+    for (uint32_t round = 0; round < 5; round++) {
+        double begin = wallSeconds();
+        const Hierarchy slow = build(scene.mesh, BuildMode::Quality, &pool);
+        quality.values.push_back(wallSeconds() - begin);
+        begin = wallSeconds();
+        Hierarchy quick = build(scene.mesh, BuildMode::Fast, &pool);
+        fast.values.push_back(wallSeconds() - begin);
+        begin = wallSeconds();
+        check(detail::refitHierarchy(quick, std::span(&geometry, 1), &pool));
+        refit.values.push_back(wallSeconds() - begin);
+        if (round != 0) continue;
+        const Hierarchy& fast_built = quick;
+        for (const auto& [name, hierarchy] : {std::pair{"quality", &slow}, std::pair{"fast", &fast_built}}) {
+            fmt::print(
+                "  {}: {:.1f} bytes a triangle, {:.1f} at the peak of the build; {} nodes, {:.2f} children each, "
+                "{} levels\n",
+                name, double(hierarchy->bytes()) / geometry.triangles,
+                double(hierarchy->build_bytes) / geometry.triangles, hierarchy->nodes,
+                double(hierarchy->nodes - 1 + hierarchy->records) / hierarchy->nodes, hierarchy->depth);
+        }
+    }
+    printTimes("quality", quality);
+    printTimes("fast", fast);
+    printTimes("refit", refit);
+    const std::string machine = fmt::format("{}, {} threads", processorName(), pool.size());
+    report.add("tracing.build.quality", million / quality.minimum(), "million triangles a second", "nothing", machine);
+    report.add("tracing.build.fast", million / fast.minimum(), "million triangles a second", "nothing", machine);
+    report.add("tracing.build.refit", million / refit.minimum(), "million triangles a second", "nothing", machine);
+}
+
+}  // namespace
+
+Benchmark tracingSoftwareBenchmark() {
+    return {{"tracing.bunny.camera.software_over_embree1", "tracing.bunny.bounce.software_over_embree1",
+             "tracing.100k.camera.software_over_embree1", "tracing.100k.bounce.software_over_embree1",
+             "tracing.1m.camera.software_over_embree1", "tracing.1m.bounce.software_over_embree1"},
+            runTracing};
+}
+
+Benchmark tracingBuildBenchmark() {
+    return {{"tracing.build.quality", "tracing.build.fast", "tracing.build.refit"}, runBuilds};
+}
+
+}  // namespace glint::bench

@@ -1,0 +1,354 @@
+// Hierarchies of the software tracing engine, looked at on the CPU.
+
+#include "support/matchers.h"
+#include "support/reference.h"
+
+#include <glint/geometry/primitives.h>
+#include <glint/tracing/detail/header.h>
+#include <glint/tracing/detail/hierarchy.h>
+#include <glint/tracing/detail/parallel.h>
+#include <glint/tracing/detail/primitives.h>
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+namespace glint::test {
+
+namespace {
+
+using namespace glint::detail;
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+
+TriangleGeometry geometryOf(const Mesh& mesh) {
+    TriangleGeometry geometry;
+    geometry.positions = reinterpret_cast<const std::byte*>(mesh.positions.data());
+    geometry.vertices = static_cast<uint32_t>(mesh.positions.size());
+    geometry.indices = reinterpret_cast<const std::byte*>(mesh.indices.data());
+    geometry.index = TriangleGeometry::Index::Uint32;
+    geometry.triangles = static_cast<uint32_t>(mesh.triangleCount());
+    return geometry;
+}
+
+Hierarchy build(const Mesh& mesh, BuildMode mode, ThreadPool* pool = nullptr) {
+    const TriangleGeometry geometry = geometryOf(mesh);
+    Expected<Hierarchy> hierarchy = buildHierarchy(std::span(&geometry, 1), mode, pool);
+    if (!hierarchy) throw std::runtime_error(hierarchy.error().text());
+    return std::move(*hierarchy);
+}
+
+bool equal(const Hierarchy& a, const Hierarchy& b) {
+    return a.bytes() == b.bytes() && std::memcmp(a.texels.data(), b.texels.data(), a.bytes()) == 0 &&
+           a.runs == b.runs && a.depth == b.depth;
+}
+
+/// Small triangles in a cube.
+Mesh soup(uint32_t triangles, uint64_t seed, double size = 1.0, double offset = 0.0) {
+    Random random(seed);
+    Mesh mesh;
+    for (uint32_t i = 0; i < triangles; i++) {
+        const Vector3d center(random.uniform(), random.uniform(), random.uniform());
+        for (uint32_t c = 0; c < 3; c++) {
+            mesh.indices.push_back(3 * i + c);
+            mesh.positions.push_back(Vector3f((center + 0.1 * random.direction()) * size + offset));
+        }
+    }
+    return mesh;
+}
+
+struct Bounds {
+    double lo[3] = {1e300, 1e300, 1e300};
+    double hi[3] = {-1e300, -1e300, -1e300};
+};
+
+/// Walks through a hierarchy and checks all that the traversal relies on.
+class Walk {
+public:
+    explicit Walk(const Hierarchy& hierarchy) : hierarchy_(hierarchy), seen_(hierarchy.records) {
+        const Header header = readHeader(hierarchy);
+        std::memcpy(grid_.minimum, header.minimum, sizeof(grid_.minimum));
+        grid_.step = header.step;
+        EXPECT_EQ(header.nodes, hierarchy.nodes);
+        EXPECT_EQ(header.records, hierarchy.records);
+        EXPECT_EQ(header.first_record, hierarchy.firstRecord());
+        node(1, 1);
+        EXPECT_EQ(visited_, hierarchy.nodes);
+        EXPECT_EQ(deepest_, hierarchy.depth);
+        EXPECT_LE(hierarchy.depth, max_depth);
+        for (const uint32_t times : seen_) EXPECT_EQ(times, 1u) << "a record is in no leaf, or in several";
+    }
+
+    double area = 0.0;  ///< of all nodes' boxes but the root's, decoded: what the collapse keeps small
+
+private:
+    Bounds node(uint32_t index, uint32_t level) {
+        Bounds bounds;
+        if (index == 0 || index > hierarchy_.nodes) {
+            ADD_FAILURE() << "no node has the index " << index;
+            return bounds;
+        }
+        visited_++;
+        deepest_ = std::max(deepest_, level);
+        Node node;
+        std::memcpy(&node, &hierarchy_.texels[4 * size_t(index)], sizeof(node));
+        EXPECT_LE(node.leaves(), node.children());
+        EXPECT_LE(node.children(), node_width);
+        for (uint32_t s = 0; s < node.children(); s++) {
+            const Bounds inner = s < node.leaves() ? record(node.record() + s) : this->node(node.child(s), level + 1);
+            double lo[3];
+            double hi[3];
+            node.box(grid_, s, lo, hi);
+            for (int axis = 0; axis < 3; axis++) {
+                if (!(inner.lo[axis] <= inner.hi[axis])) continue;
+                EXPECT_LE(lo[axis], inner.lo[axis]) << "node " << index << " child " << s;
+                EXPECT_GE(hi[axis], inner.hi[axis]) << "node " << index << " child " << s;
+                bounds.lo[axis] = std::min(bounds.lo[axis], inner.lo[axis]);
+                bounds.hi[axis] = std::max(bounds.hi[axis], inner.hi[axis]);
+            }
+            const double d[3] = {hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]};
+            if (s >= node.leaves()) area += d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
+        }
+        return bounds;
+    }
+
+    Bounds record(uint32_t index) {
+        Bounds bounds;
+        if (index >= hierarchy_.records) {
+            ADD_FAILURE() << "no record has the index " << index;
+            return bounds;
+        }
+        seen_[index]++;
+        Record record;
+        std::memcpy(&record, &hierarchy_.texels[hierarchy_.firstRecord() + 3 * size_t(index)], sizeof(record));
+        const uint32_t corners = hierarchy_.kind == Hierarchy::Kind::Triangles ? 3 : 2;
+        if (!allFinite(record.values, 3 * corners)) return bounds;
+        for (uint32_t i = 0; i < 3 * corners; i++) {
+            bounds.lo[i % 3] = std::min(bounds.lo[i % 3], double(record.values[i]));
+            bounds.hi[i % 3] = std::max(bounds.hi[i % 3], double(record.values[i]));
+        }
+        return bounds;
+    }
+
+    const Hierarchy& hierarchy_;
+    Grid grid_;
+    std::vector<uint32_t> seen_;
+    uint32_t visited_ = 0;
+    uint32_t deepest_ = 0;
+};
+
+constexpr BuildMode both_modes[] = {BuildMode::Quality, BuildMode::Fast};
+
+TEST(TracingHierarchy, HoldsItsPrimitivesForAllSizes) {
+    for (const BuildMode mode : both_modes) {
+        for (const uint32_t count : {0u,  1u,   2u,   3u,   7u,    8u,    9u,    15u,    16u,    17u,    63u,   64u,
+                                     65u, 255u, 256u, 257u, 4095u, 4096u, 4097u, 16383u, 16384u, 16385u, 40000u}) {
+            SCOPED_TRACE(count);
+            const Hierarchy hierarchy = build(soup(count, count), mode);
+            EXPECT_EQ(hierarchy.records, count);
+            EXPECT_EQ(hierarchy.inactive, 0u);
+            const Walk walk(hierarchy);
+            // What a triangle takes at the driver of the development machine, and what the root takes besides.
+            EXPECT_LE(hierarchy.bytes(), 104 * uint64_t(count) + 128);
+        }
+    }
+}
+
+TEST(TracingHierarchy, IsTheSameForAnyNumberOfThreads) {
+    const Mesh mesh = soup(50000, 1);
+    for (const BuildMode mode : both_modes) {
+        const Hierarchy one = build(mesh, mode);
+        for (const uint32_t threads : {1u, 2u, 3u, 7u}) {
+            ThreadPool pool(threads);
+            EXPECT_TRUE(equal(one, build(mesh, mode, &pool))) << threads << " threads";
+        }
+    }
+}
+
+TEST(TracingHierarchy, StandsWhatBuildersStumbleOver) {
+    Mesh one_place = soup(1, 3);
+    for (uint32_t i = 0; i < 5000; i++) {
+        for (uint32_t c = 0; c < 3; c++) one_place.indices.push_back(c);
+    }
+    // Each triangle half as far as the one before: a chain for the surface area heuristic.
+    Mesh chain;
+    for (int i = 0; i < 240; i++) {
+        for (int c = 0; c < 3; c++) {
+            chain.indices.push_back(static_cast<uint32_t>(chain.positions.size()));
+            const float scale = std::ldexp(1.0f, 120 - i);
+            chain.positions.push_back(Vector3f(c == 0 ? 1.0f : 1.1f, c == 1 ? 1.0f : 0.1f, 0.2f) * scale);
+        }
+    }
+    Mesh flat = soup(3000, 4);
+    for (Vector3f& p : flat.positions) p.z = 7.0f;
+    Mesh line = soup(3000, 5);
+    for (Vector3f& p : line.positions) p.y = p.z = -3.0f;
+    const std::pair<const char*, Mesh> cases[] = {
+        {"one place", one_place},
+        {"chain", chain},
+        {"plane", flat},
+        {"line", line},
+        {"1e30", soup(3000, 6, 1e30)},
+        {"3e38", soup(3000, 7, 3e38)},
+        {"1e-30", soup(3000, 8, 1e-30)},
+        {"denormal", soup(3000, 9, 1e-42)},
+        {"far away", soup(3000, 10, 1.0, 1e6)},
+        {"both signs, huge", soup(3000, 11, 6e38, -3e38)},
+    };
+    for (const auto& [name, mesh] : cases) {
+        SCOPED_TRACE(name);
+        for (const BuildMode mode : both_modes) {
+            const Hierarchy hierarchy = build(mesh, mode);
+            EXPECT_EQ(hierarchy.records + hierarchy.inactive, mesh.triangleCount());
+            const Walk walk(hierarchy);
+        }
+    }
+}
+
+TEST(TracingHierarchy, LeavesOutWhatIsNotFinite) {
+    Mesh mesh = soup(100, 2);
+    mesh.positions[3 * 10].x = nan;
+    mesh.positions[3 * 20 + 1].y = infinity;
+    mesh.positions[3 * 30 + 2].z = -infinity;
+    for (const BuildMode mode : both_modes) {
+        const Hierarchy hierarchy = build(mesh, mode);
+        EXPECT_EQ(hierarchy.records, 97u);
+        EXPECT_EQ(hierarchy.inactive, 3u);
+        const Walk walk(hierarchy);
+    }
+    for (Vector3f& p : mesh.positions) p.x = nan;
+    const Hierarchy empty = build(mesh, BuildMode::Quality);
+    EXPECT_EQ(empty.records, 0u);
+    const Walk walk(empty);
+}
+
+TEST(TracingHierarchy, TakesSeveralGeometriesAndFormsOfIndices) {
+    const Mesh mesh = soup(300, 12);
+    std::vector<uint16_t> shorts(mesh.indices.begin(), mesh.indices.begin() + 300);
+    struct Vertex {
+        Vector3f position;
+        float other;
+    };
+    std::vector<Vertex> spread;
+    for (const Vector3f& p : mesh.positions) spread.push_back({p, nan});
+    TriangleGeometry geometries[4];
+    geometries[0] = geometryOf(mesh);
+    geometries[0].opaque = false;
+    geometries[1] = geometryOf(mesh);
+    geometries[1].indices = reinterpret_cast<const std::byte*>(shorts.data());
+    geometries[1].index = TriangleGeometry::Index::Uint16;
+    geometries[1].triangles = 100;
+    geometries[3].positions = reinterpret_cast<const std::byte*>(spread.data());
+    geometries[3].stride = sizeof(Vertex);
+    geometries[3].vertices = static_cast<uint32_t>(spread.size());
+    geometries[3].triangles = 300;
+    const Expected<Hierarchy> hierarchy = buildHierarchy(geometries, BuildMode::Quality);
+    ASSERT_TRUE(hierarchy) << hierarchy.error().text();
+    EXPECT_EQ(hierarchy->records, 700u);
+    const Walk walk(*hierarchy);
+    std::vector<uint32_t> seen(4 * 300);
+    for (uint32_t i = 0; i < hierarchy->records; i++) {
+        Record record;
+        std::memcpy(&record, &hierarchy->texels[hierarchy->firstRecord() + 3 * size_t(i)], sizeof(record));
+        const uint32_t geometry = record.geometry & ~Record::opaque_bit;
+        ASSERT_LT(geometry, 4u);
+        ASSERT_LT(record.primitive, 300u);
+        seen[300 * geometry + record.primitive]++;
+        EXPECT_EQ((record.geometry & Record::opaque_bit) != 0, geometry != 0);
+        for (uint32_t c = 0; c < 3; c++)
+            EXPECT_EQ(std::memcmp(record.values + 3 * c, &mesh.positions[3 * record.primitive + c], 12), 0);
+    }
+    for (uint32_t i = 0; i < seen.size(); i++) EXPECT_EQ(seen[i], i < 300 ? 1u : i < 400 ? 1u : i < 900 ? 0u : 1u) << i;
+}
+
+TEST(TracingHierarchy, BuildsBoxes) {
+    Random random(13);
+    std::vector<float> boxes;
+    for (uint32_t i = 0; i < 1000; i++) {
+        float lo[3];
+        for (float& x : lo) boxes.push_back(x = static_cast<float>(random.uniform()));
+        for (const float x : lo) boxes.push_back(x + static_cast<float>(random.uniform(0.0, 0.1)));
+    }
+    boxes[6 * 5] = nan;
+    boxes[6 * 6 + 3] = boxes[6 * 6] - 1.0f;  // minimum above maximum
+    BoxGeometry geometry;
+    geometry.boxes = reinterpret_cast<const std::byte*>(boxes.data());
+    geometry.count = 1000;
+    const Expected<Hierarchy> hierarchy = buildHierarchy(std::span(&geometry, 1), BuildMode::Quality);
+    ASSERT_TRUE(hierarchy) << hierarchy.error().text();
+    EXPECT_EQ(hierarchy->records, 998u);
+    const Walk walk(*hierarchy);
+}
+
+TEST(TracingHierarchy, ExplainsBadInput) {
+    Mesh mesh = soup(10, 14);
+    mesh.indices[17] = 30;
+    TriangleGeometry geometry = geometryOf(mesh);
+    Expected<Hierarchy> hierarchy = buildHierarchy(std::span(&geometry, 1), BuildMode::Quality);
+    ASSERT_FALSE(hierarchy);
+    EXPECT_EQ(hierarchy.error().id(), "tracing.index_range");
+    EXPECT_NE(hierarchy.error().text().find("triangle 5 of geometry 0 has the index 30"), std::string::npos)
+        << hierarchy.error().text();
+    geometry.index = TriangleGeometry::Index::None;
+    geometry.triangles = 11;
+    EXPECT_EQ(buildHierarchy(std::span(&geometry, 1), BuildMode::Fast).error().id(), "tracing.vertex_count");
+    geometry.triangles = max_primitives + 1;
+    EXPECT_EQ(buildHierarchy(std::span(&geometry, 1), BuildMode::Fast).error().id(), "tracing.too_large");
+}
+
+TEST(TracingHierarchy, RefitsToTheSameAndToOtherCoordinates) {
+    for (const BuildMode mode : both_modes) {
+        Mesh mesh = soup(20000, 15);
+        const Hierarchy built = build(mesh, mode);
+        Hierarchy refitted = build(mesh, mode);
+        const TriangleGeometry geometry = geometryOf(mesh);
+        ASSERT_TRUE(refitHierarchy(refitted, std::span(&geometry, 1)));
+        EXPECT_TRUE(equal(built, refitted));
+
+        for (Vector3f& p : mesh.positions) p = Vector3f(3.0f * p.y, p.x + 100.0f, p.z * p.z);
+        mesh.positions[77].x = nan;
+        for (uint32_t i = 0; i < 3 * 64; i++) mesh.positions[i].y = infinity;
+        ThreadPool pool(3);
+        ASSERT_TRUE(refitHierarchy(refitted, std::span(&geometry, 1)));
+        const Walk walk(refitted);
+        Hierarchy parallel = build(soup(20000, 15), mode);
+        ASSERT_TRUE(refitHierarchy(parallel, std::span(&geometry, 1), &pool));
+        EXPECT_TRUE(equal(refitted, parallel));
+    }
+    Hierarchy hierarchy = build(soup(10, 16), BuildMode::Fast);
+    const Mesh other = soup(11, 17);
+    const TriangleGeometry geometry = geometryOf(other);
+    EXPECT_EQ(refitHierarchy(hierarchy, std::span(&geometry, 1)).error().id(), "tracing.refit");
+    const BoxGeometry boxes;
+    EXPECT_EQ(refitHierarchy(hierarchy, std::span(&boxes, 1)).error().id(), "tracing.refit");
+}
+
+TEST(TracingHierarchy, QualityIsWorthItsTime) {
+    // Less surface means fewer nodes visited. Triangles of very different sizes are what the curve does badly.
+    Mesh mesh = soup(20000, 18);
+    for (uint32_t i = 0; i < 3 * 200; i++) mesh.positions[i] = 5.0f * mesh.positions[i];
+    const Walk quality(build(mesh, BuildMode::Quality));
+    const Walk fast(build(mesh, BuildMode::Fast));
+    EXPECT_LT(quality.area, 0.9 * fast.area);
+}
+
+TEST(TracingHierarchy, LoopsRunEachPieceOnce) {
+    ThreadPool pool(3);
+    for (const size_t count : {size_t(0), size_t(1), size_t(2), size_t(1000)}) {
+        std::vector<std::atomic<int>> calls(count);
+        parallelFor(&pool, count, [&](size_t i) {
+            calls[i]++;
+            // Loops within loops must not wait for one another.
+            parallelFor(&pool, 3, [&](size_t) { calls[i]++; });
+        });
+        for (const auto& each : calls) EXPECT_EQ(each, 4);
+    }
+}
+
+}  // namespace
+
+}  // namespace glint::test

@@ -16,14 +16,18 @@ uint32_t ulpDistance(float a, float b);
 /// Where a ray meets a mesh first.
 struct ReferenceHit {
     bool hit = false;
-    double t = 0.0;         ///< in units of the direction's length
-    uint32_t triangle = 0;  ///< the lowest of those with the same t
-    Vector2d barycentrics;  ///< of the second and the third corner
+    double t = 0.0;                         ///< in units of the direction's length
+    uint32_t triangle = 0;                  ///< the lowest of those with the same t
+    Vector2d barycentrics = Vector2d(0.0);  ///< of the second and the third corner
 };
 
-/// Closest hit with t_min <= t <= t_max by trying every triangle, from both sides, in float64. Edges belong to both
-/// triangles, with the width of float64's rounding (about 1e-15 of the distance), so that nothing leaks; triangles of
-/// zero area and rays in a triangle's plane do not meet.
+/// Where the line of a ray meets a triangle, whatever t. From both sides. Signs are those of exact arithmetic (products
+/// near 0 are taken again with 113 bits), so that edges and corners belong to all their triangles and nothing leaks;
+/// t and the barycentrics are rounded as float64 is. Triangles of zero area, those with a corner that is not finite,
+/// and rays in a triangle's plane do not meet.
+ReferenceHit intersectTriangle(const Mesh& mesh, uint32_t triangle, const Vector3d& origin, const Vector3d& direction);
+
+/// Closest hit with t_min <= t <= t_max by trying every triangle; of equally close ones that with the lowest number.
 ReferenceHit closestHit(const Mesh& mesh, const Vector3d& origin, const Vector3d& direction, double t_min = 0.0,
                         double t_max = 1e300);
 

@@ -1,0 +1,90 @@
+#include "accuracy/embree.h"
+
+// The two versions that distributions have differ in a few names.
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cstring>
+#include <memory>
+#include <stdexcept>
+#include <type_traits>
+
+namespace glint::test {
+
+namespace {
+
+struct Release {
+    void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+    void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+    void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
+};
+template <class Handle>
+using Holder = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
+
+template <class T>
+void copyIn(RTCGeometry geometry, RTCBufferType type, RTCFormat format, const std::vector<T>& values, size_t stride) {
+    const size_t count = values.size() * sizeof(T) / stride;
+    void* place = rtcSetNewGeometryBuffer(geometry, type, 0, format, stride, count);
+    if (!place) throw std::runtime_error("Embree has no memory");
+    std::memcpy(place, values.data(), values.size() * sizeof(T));
+}
+
+}  // namespace
+
+std::vector<RayHit> castWithEmbree(const Mesh& mesh, std::span<const Ray> rays, EmbreeMode mode, double* seconds) {
+    const Holder<RTCDevice> device(rtcNewDevice("threads=1"));
+    const Holder<RTCScene> scene(rtcNewScene(device.get()));
+    rtcSetSceneFlags(scene.get(), mode == EmbreeMode::Robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    const Holder<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+    copyIn(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh.positions, sizeof(Vector3f));
+    copyIn(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.indices, 3 * sizeof(uint32_t));
+    rtcCommitGeometry(geometry.get());
+    rtcAttachGeometry(scene.get(), geometry.get());
+    rtcCommitScene(scene.get());
+
+    std::vector<RayHit> hits;
+    hits.reserve(rays.size());
+    const auto begin = std::chrono::steady_clock::now();
+    for (const Ray& ray : rays) {
+        RTCRayHit query = {};
+        query.ray.org_x = ray.origin.x;
+        query.ray.org_y = ray.origin.y;
+        query.ray.org_z = ray.origin.z;
+        query.ray.tnear = ray.t_min;
+        query.ray.dir_x = ray.direction.x;
+        query.ray.dir_y = ray.direction.y;
+        query.ray.dir_z = ray.direction.z;
+        query.ray.tfar = ray.t_max;
+        query.ray.mask = 0xffffffff;
+        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+        query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+#if RTC_VERSION_MAJOR >= 4
+        rtcIntersect1(scene.get(), &query);
+#else
+        RTCIntersectContext context;
+        rtcInitIntersectContext(&context);
+        rtcIntersect1(scene.get(), &context, &query);
+#endif
+        RayHit hit;
+        if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+            const RTCHit& found = query.hit;
+            // Its normal follows from the corners as ours does, so it looks towards the origin of a ray from in front.
+            const float facing =
+                found.Ng_x * ray.direction.x + found.Ng_y * ray.direction.y + found.Ng_z * ray.direction.z;
+            hit = {query.ray.tfar, found.primID, 0, found.u, found.v, facing < 0.0f ? 1u : 0u};
+        }
+        hits.push_back(hit);
+    }
+    if (seconds) *seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    return hits;
+}
+
+std::string embreeName() { return fmt::format("Embree {}", RTC_VERSION_STRING); }
+
+}  // namespace glint::test

@@ -205,12 +205,15 @@ Expected<Outcome> cast(const Options& options) {
     std::optional<Expected<RayCaster>> caster;
     {
         const Stopwatch watch(outcome.seconds.build);
-        // What goes wrong is returned, too: one line is enough.
+        // Errors are returned, too: one line is enough. What the validation layer says is not.
+        const auto tell = [](const Message& message) {
+            if (message.error.id() == "vulkan.validation") fmt::print(stderr, "{}\n", message.error.text());
+        };
         const Device device = Device::create({.api = options.api,
                                               .adapter = options.adapter,
                                               .required = FeatureComputeTracing,
                                               .optional = FeatureNone,
-                                              .message = [](const Message&) {}});
+                                              .message = tell});
         if (!device) return unexpected(device.error());
         outcome.info = device.getInfo();
         caster = RayCaster::create(device, **mesh);
@@ -252,7 +255,7 @@ int run(const Options& options) {
 Command castCommand(CLI::App& app) {
     auto options = std::make_shared<Options>();
     CLI::App* sub = app.add_subcommand("cast", "Casts rays at a mesh: closest hits, or occlusion");
-    sub->add_option("MESH", options->mesh, "Mesh of triangles (.obj)")->required();
+    sub->add_option("MESH", options->mesh, "Mesh of triangles")->required();
     sub->add_option("RAYS", options->rays, "Rays: float32 [N, 8] as .npy: origin, tmin, direction, tmax")->required();
     sub->add_option("HITS", options->hits,
                     "Where to write the hits: [N] as .npy, of t, primitive, geometry, u, v, front")

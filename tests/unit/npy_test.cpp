@@ -7,6 +7,9 @@
 
 #include <gtest/gtest.h>
 
+#include <sys/resource.h>
+
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 
@@ -325,6 +328,31 @@ TEST(Npy, AWriterThatIsDroppedLeavesNothing) {
     Expected<NpyWriter> writer = NpyWriter::create(dir / "a.npy", structure(10));
     ASSERT_THAT(writer, IsOk());
     EXPECT_THAT(writer->close(), HasErrorId("npy.data_size"));
+    EXPECT_TRUE(std::filesystem::is_empty(dir.path()));
+}
+
+// A limit on the size of files stands for a disk that is full: what does not fit is an error, and nothing is left.
+TEST(Npy, ADiskThatIsFull) {
+    const TempDir dir;
+    rlimit before = {};
+    ASSERT_EQ(::getrlimit(RLIMIT_FSIZE, &before), 0);
+    const auto old = std::signal(SIGXFSZ, SIG_IGN);
+    const rlimit small = {100000, before.rlim_max};
+    ASSERT_EQ(::setrlimit(RLIMIT_FSIZE, &small), 0);
+    const NpyHeader header = {{NpyField::of<double>()}, {20000}};
+    Expected<NpyWriter> writer = NpyWriter::create(dir / "a.npy", header);
+    Status status = writer ? writer->write(Bytes(160000)) : writer.error();
+    if (status) status = writer->close();
+    // The last bytes reach the file when it is closed.
+    Expected<NpyWriter> late = NpyWriter::create(dir / "b.npy", {{NpyField::of<uint8_t>()}, {100000}});
+    Status late_status;
+    for (int i = 0; i < 100000 && late && late_status; i++) late_status = late->write(Bytes(1));
+    if (late && late_status) late_status = late->close();
+    ::setrlimit(RLIMIT_FSIZE, &before);
+    std::signal(SIGXFSZ, old);
+    EXPECT_THAT(status, HasErrorId("file.write"));
+    EXPECT_THAT(late, IsOk());
+    EXPECT_THAT(late_status, HasErrorId("file.write"));
     EXPECT_TRUE(std::filesystem::is_empty(dir.path()));
 }
 

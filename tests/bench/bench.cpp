@@ -27,6 +27,12 @@ void Report::add(std::string name, double value, std::string unit, std::string a
         {std::move(name), value, std::move(unit), std::move(against), std::move(device), std::move(command)});
 }
 
+std::filesystem::path Report::folder() const {
+    const std::filesystem::path folder = options_.json.parent_path() / "report";
+    std::filesystem::create_directories(folder);
+    return folder;
+}
+
 void Report::write() const {
     if (figures_.empty()) return;
     nlohmann::json kept = nlohmann::json::array();

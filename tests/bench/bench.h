@@ -38,6 +38,8 @@ public:
     const Options& options() const { return options_; }
     /// `command` is the benchmark that makes the figure again.
     void add(std::string name, double value, std::string unit, std::string against, std::string device);
+    /// Where `./dev report` finds tables and curves; made if absent.
+    std::filesystem::path folder() const;
     /// Writes the figures over those of the same names in the file and keeps the others.
     void write() const;
 
@@ -60,6 +62,7 @@ Benchmark startupBenchmark();
 Benchmark memoryBenchmark();
 Benchmark tracingSoftwareBenchmark();
 Benchmark tracingBuildBenchmark();
+Benchmark castBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

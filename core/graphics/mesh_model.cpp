@@ -161,10 +161,9 @@ Status MeshModel::create(const Device& device, const Mesh& mesh, Flags flags, Wh
 }
 
 Status MeshModel::create(const Device& device, const Pipeline& pipeline, const Mesh& mesh, Flags flags, Where where) {
-    device_ = device;
     const ObjectState state = pipeline.state();
     if (state == ObjectState::Null || state == ObjectState::Failed) {
-        error_ = {};
+        device_ = device;
         return fail(pipeline.error().at(where));
     }
     return create(device, pipeline.getAttributes(), mesh, flags, where);
@@ -409,10 +408,12 @@ Tracing MeshModel::createTracing(Tracing::Flags flags, Where where) const {
     const uint32_t slot = position == layout_.end() ? 0 : position->buffer;
     const uint64_t offset = getVertexOffset(slot) + (position == layout_.end() ? 0 : position->offset);
     const uint64_t index_size = index_format_ == FormatRu16 ? 2 : 4;
+    // Without buffers the structure fails, and says so.
+    const Buffer vertices = *this ? vertex_buffer_ : Buffer();
+    const Buffer indices = *this ? index_buffer_ : Buffer();
     for (const MeshPart& geometry : geometries_) {
-        // Without buffers these fail, and the structure says so.
-        tracing.addVertexBuffer(vertices_, format, getVertexStride(slot), vertex_buffer_, offset, where);
-        tracing.addIndexBuffer(geometry.index_count, index_format_, index_buffer_,
+        tracing.addVertexBuffer(vertices_, format, getVertexStride(slot), vertices, offset, where);
+        tracing.addIndexBuffer(geometry.index_count, index_format_, indices,
                                index_offset_ + geometry.first_index * index_size, where);
     }
     (void)tracing.create(Tracing::TypeTriangle, flags, where);

@@ -166,6 +166,12 @@ MISUSE(DrawBeforeThePipeline, "draw.pipeline") {
     return kit.command([&](Command& list) { plane.draw(list); });
 }
 MISUSE(TraceOfWhatIsNowhere, "tracing.buffer") { return taken(kit).createTracing().error(); }
+MISUSE(TraceOfAModelThatFailedLater, "tracing.buffer") {
+    MeshModel plane(kit.device, createPlane(1.0f), MeshModel::FlagBufferTracing);
+    plane.setIndexBuffer(kit.buffer(Buffer::FlagIndex), 2);
+    kit.log.take();
+    return plane.createTracing().error();
+}
 MISUSE(TraceOfAnUntraceableModel, "buffer.flag") {
     return MeshModel(kit.device, createPlane(1.0f)).createTracing().error();
 }

@@ -133,6 +133,7 @@ int main(int argc, char** argv) {
     std::array<float, emitter_pairs* 2> owed = {};
     uint32_t steps = 0;
 
+    example.statistics().counts["emitters"] = emitter_pairs * 2;
     Viewer viewer(example, device);
     const Status status = viewer.run([&](Frame& frame) -> Status {
         if (frame.is_resized) {
@@ -206,7 +207,6 @@ int main(int argc, char** argv) {
     const Expected<std::vector<uint32_t>> count = device.read<uint32_t>(counters);
     if (!count) return report(count.error());
     example.statistics().counts["particles"] = (*count)[0];
-    example.statistics().counts["emitters"] = emitter_pairs * 2;
     example.statistics().counts["steps"] = steps;
     std::printf("%u particles after %u steps, %.1f ms a step, %.1f ms to draw\n", (*count)[0], steps,
                 example.statistics().median("simulate") * 1e-6, example.statistics().median("draw") * 1e-6);

@@ -1,7 +1,7 @@
 // Ray queries over 4,608 instances whose places change in every frame, from a compute or from a fragment shader.
 
 #include "05_hello_tracing/scene.h"
-#include "common/device.h"
+#include "common/viewer.h"
 
 #include <glint/graphics/mesh_model.h>
 
@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
     bool use_fragment = false, is_single = false;
     example.add("--mesh", mesh_path, "Mesh to show (.obj, .ply); a torus without it");
     example.add("--single", is_single, "Show one instance, from near");
-    example.add("--fragment", use_fragment, "Trace in a fragment shader instead of a compute shader");
+    example.addKnob("--fragment", use_fragment, "Trace in a fragment shader instead of a compute shader");
     if (!example.parse(argc, argv)) return example.exitCode();
 
     const Expected<InstancedScene> places = InstancedScene::load(mesh_path, is_single);
@@ -58,67 +58,12 @@ int main(int argc, char** argv) {
     if (Status status = device.buildTracings({&triangles, 1}, scratch, Tracing::FlagCompact); !status)
         return report(status.error());
 
-    Kernel kernel;
-    Pipeline pipeline;
-    Target target;
-    Texture picture;
-    if (use_fragment) {
-        pipeline = device.createPipeline("trace");
-        pipeline.setColorFormat(FormatRGBAu8n);
-        pipeline.loadShaderGLSL(Shader::TypeVertex, EXAMPLE_DIR "/main.shader", "VERTEX_SHADER=1");
-        pipeline.loadShaderGLSL(Shader::TypeFragment, EXAMPLE_DIR "/main.shader", "FRAGMENT_SHADER=1");
-        if (!pipeline.create()) return report(pipeline.error());
-        picture = device.createTexture2D(FormatRGBAu8n, example.width(), example.height(), Texture::FlagTarget);
-        target = device.createTarget(picture);
-        target.setClearColor(Color::gray());
-    } else {
-        kernel = device.createKernel("trace");
-        kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader", "COMPUTE_SHADER=1");
-        if (!kernel.create()) return report(kernel.error());
-        picture = device.createTexture2D(FormatRGBAu8n, example.width(), example.height(), Texture::FlagSurface);
-    }
-
-    PassTimer timer(example, device);
-    for (uint32_t frame = 0; frame < example.options().frames; frame++) {
-        const float time = static_cast<float>(example.time(frame));
-        const std::vector<Transform3x4> transforms = places->transforms(time);
-        for (size_t i = 0; i < instances.size(); i++)
-            std::copy(transforms[i].rows.begin(), transforms[i].rows.end(), instances[i].transform);
-
-        Compute compute = device.createCompute();
-        timer.begin(compute, "build");
-        compute.setInstances(scene, instances);
-        compute.buildTracing(scene, scratch);
-        timer.end(compute);
-
-        const auto bind = [&](Recorder& recorder) {
-            recorder.setUniform(0, Parameters{places->camera(time, example.aspect()).parameters(),
-                                              {example.width(), example.height()},
-                                              InstancedScene::split(time)});
-            recorder.setStorageBuffers(0, {model.getVertexBuffer(), model.getIndexBuffer()});
-            recorder.setTracing(0, scene);
-        };
-        Status status;
-        if (use_fragment) {
-            Command command = device.createCommand(target);
-            timer.begin(command, "trace");
-            command.setPipeline(pipeline);
-            bind(command);
-            command.drawArrays(3);
-            timer.end(command);
-            status = device.submit({compute, command});
-        } else {
-            timer.begin(compute, "trace");
-            compute.setKernel(kernel);
-            bind(compute);
-            compute.setSurfaceTexture(0, picture);
-            compute.dispatch(picture);
-            timer.end(compute);
-            status = device.submit(compute);
-        }
-        if (!status) return report(status.error());
-        if (status = timer.collect(); !status) return report(status.error());
-    }
+    Kernel kernel = device.createKernel("trace");
+    Pipeline pipeline = device.createPipeline("trace");
+    pipeline.setColorFormat(FormatRGBAu8n);
+    pipeline.loadShaderGLSL(Shader::TypeVertex, EXAMPLE_DIR "/main.shader", "VERTEX_SHADER=1");
+    pipeline.loadShaderGLSL(Shader::TypeFragment, EXAMPLE_DIR "/main.shader", "FRAGMENT_SHADER=1");
+    kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader", "COMPUTE_SHADER=1");
 
     Statistics& statistics = example.statistics();
     const uint64_t tracing_bytes = triangles.getMemory() + scene.getMemory();
@@ -126,12 +71,56 @@ int main(int argc, char** argv) {
                          {"vertices", model.getVertices()},     {"instance_bytes", instances.size() * record_size},
                          {"tracing_bytes", tracing_bytes},      {"vertex_bytes", model.getVertexSize()},
                          {"index_bytes", model.getIndexSize()}, {"build_bytes", build_size}};
-    statistics.setRays("trace", 1ull * example.width() * example.height());
+
+    Viewer viewer(example, device);
+    const Status status = viewer.run([&](Frame& frame) {
+        const auto time = static_cast<float>(frame.time);
+        const std::vector<Transform3x4> transforms = places->transforms(time);
+        for (size_t i = 0; i < instances.size(); i++)
+            std::copy(transforms[i].rows.begin(), transforms[i].rows.end(), instances[i].transform);
+
+        Compute compute = device.createCompute();
+        frame.timer.begin(compute, "build");
+        compute.setInstances(scene, instances);
+        compute.buildTracing(scene, scratch);
+        frame.timer.end(compute);
+
+        Camera camera = places->camera(time, frame.aspect());
+        camera.lookAt(frame.view.eye(camera.position(), places->target()), places->target());
+        const auto bind = [&](Recorder& recorder) {
+            recorder.setUniform(
+                0, Parameters{camera.parameters(), {frame.width, frame.height}, InstancedScene::split(time)});
+            recorder.setStorageBuffers(0, {model.getVertexBuffer(), model.getIndexBuffer()});
+            recorder.setTracing(0, scene);
+        };
+        if (use_fragment) {
+            if (!pipeline && !pipeline.create()) return Status(pipeline.error());
+            frame.target.setClearColor(Color::gray());
+            Command command = device.createCommand(frame.target);
+            frame.timer.begin(command, "trace");
+            command.setPipeline(pipeline);
+            bind(command);
+            command.drawArrays(3);
+            frame.timer.end(command);
+            return device.submit({compute, command});
+        }
+        if (!kernel && !kernel.create()) return Status(kernel.error());
+        frame.timer.begin(compute, "trace");
+        compute.setKernel(kernel);
+        bind(compute);
+        compute.setSurfaceTexture(0, frame.picture);
+        compute.dispatch(frame.picture);
+        frame.timer.end(compute);
+        return device.submit(compute);
+    });
+    if (!status) return report(status.error());
+
+    statistics.setRays("trace", 1ull * statistics.width * statistics.height);
     std::printf("%zu instances of %llu triangles\n", instances.size(),
                 static_cast<unsigned long long>(triangles.getPrimitives()));
     for (const char* name : {"instance", "tracing", "vertex", "index", "build"})
         printBytes(name, statistics.counts[std::string(name) + "_bytes"]);
     std::printf("%.1f ms to build the scene, %.1f ms to trace it\n", statistics.median("build") * 1e-6,
                 statistics.median("trace") * 1e-6);
-    return finish(example, device, picture);
+    return viewer.finish();
 }

@@ -82,10 +82,11 @@ public:
         const float k = 1.0f - std::cos(0.2f * time);
         const glint::Vector3f from =
             is_single_ ? glint::Vector3f(5.0f, -1.0f, 1.5f) : glint::Vector3f(32.0f + 24.0f * k, 0.0f, 8.0f + 8.0f * k);
-        const glint::Vector3f to = is_single_ ? glint::Vector3f(0.0f) : glint::Vector3f(0.0f, 0.0f, -16.0f);
         const glint::Matrix4x4f turn = glint::rotateZ((is_single_ ? 20.0f : 2.0f) * time);
-        return glint::Camera().lookAt(glint::transformPoint(turn, from), to).perspective(60.0f, aspect);
+        return glint::Camera().lookAt(glint::transformPoint(turn, from), target()).perspective(60.0f, aspect);
     }
+    /// What it looks at.
+    glint::Vector3f target() const { return {0.0f, 0.0f, is_single_ ? 0.0f : -16.0f}; }
 
     /// Left of it the picture is plain, right of it coloured by instance; as a share of its width.
     static float split(float time) { return 0.75f + 0.25f * std::cos(time); }

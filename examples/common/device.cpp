@@ -1,7 +1,5 @@
 #include "common/device.h"
 
-#include <glint/graphics/picture.h>
-
 #include <cstdio>
 
 using namespace glint;
@@ -24,13 +22,6 @@ Device openDevice(Example& example, FeatureMask required) {
     for (uint32_t i = 0; i < FeatureCount; i++)
         if (device.getFeatures().has(1ull << i)) statistics.features.push_back(featureNames(1ull << i));
     return device;
-}
-
-int finish(Example& example, Device& device, const Texture& picture) {
-    const Expected<Image> image = readImage(device, picture);
-    if (!image) return report(image.error());
-    if (Status status = example.saveImage(*image); !status) return report(status.error());
-    return example.finish();
 }
 
 void PassTimer::begin(Recorder& recorder, const std::string& pass) {

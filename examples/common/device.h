@@ -12,9 +12,6 @@
 /// Opens the device that the arguments ask for and notes it in the statistics. On failure the handle carries the error.
 glint::Device openDevice(Example& example, glint::FeatureMask required = glint::FeatureNone);
 
-/// Writes the picture where --image says, the statistics where --stats says, and ends the program: the exit code.
-int finish(Example& example, glint::Device& device, const glint::Texture& picture);
-
 /// Measures passes on the GPU for the statistics; does nothing on a device without time queries.
 class PassTimer {
 public:
@@ -30,8 +27,6 @@ public:
     glint::Status next();
     /// Adds the times of all frames that are under way, and waits for the device.
     glint::Status finish();
-    /// Both at once, for a program that waits for each frame.
-    glint::Status collect() { return finish(); }
 
 private:
     /// The passes of one frame; queries are used again.

@@ -1,6 +1,7 @@
 #include "common/example.h"
 
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <charconv>
@@ -123,10 +124,13 @@ void Example::addKnob(const std::string& flag, uint32_t& value, uint32_t minimum
 }
 
 void Example::addKnob(const std::string& flag, float& value, float minimum, float maximum, const std::string& help) {
-    parser_->app.add_option(flag, value, help)
-        ->type_name("NUMBER")
-        ->capture_default_str()
-        ->check(CLI::Range(minimum, maximum));
+    const auto check = [minimum, maximum](const std::string& text) {
+        float number = 0.0f;
+        // Written so that NaN fails.
+        if (CLI::detail::lexical_cast(text, number) && number >= minimum && number <= maximum) return std::string();
+        return fmt::format("'{}' is no number from {} to {}", text, minimum, maximum);
+    };
+    parser_->app.add_option(flag, value, help)->type_name("NUMBER")->capture_default_str()->check(check);
     knobs_.push_back({knobName(flag), help, &value, minimum, maximum});
 }
 

@@ -3,6 +3,7 @@
 #include "common/panel.h"
 
 #include <glint/format/image.h>
+#include <glint/graphics/picture.h>
 
 #include <algorithm>
 #include <chrono>
@@ -75,6 +76,11 @@ bool Viewer::nextPicture() {
 }
 
 void Viewer::takeInput() {
+    if (!panel_->hasKeyboard()) {
+        if (window_.isKeyPressed(Window::KeyEscape)) is_closing_ = true;
+        if (window_.isKeyPressed(Window::KeySpace)) is_paused_ = !is_paused_;
+        if (window_.isKeyPressed(Window::KeyTab)) is_panel_hidden_ = !is_panel_hidden_;
+    }
     const double now = seconds();
     const double step = now - last_;
     last_ = now;
@@ -84,11 +90,6 @@ void Viewer::takeInput() {
         frames_per_second_ = second_frames_ / (now - second_began_);
         second_began_ = now;
         second_frames_ = 0;
-    }
-    if (!panel_->hasKeyboard()) {
-        if (window_.isKeyPressed(Window::KeyEscape)) is_closing_ = true;
-        if (window_.isKeyPressed(Window::KeySpace)) is_paused_ = !is_paused_;
-        if (window_.isKeyPressed(Window::KeyTab)) is_panel_hidden_ = !is_panel_hidden_;
     }
     view_.update(window_, !panel_->hasMouse() || is_panel_hidden_, now);
     panel_->update(window_, example_, {frames_per_second_, is_paused_}, step);
@@ -149,4 +150,11 @@ Status Viewer::run(const std::function<Status(Frame&)>& draw) {
     return timer_.finish();
 }
 
-int Viewer::finish() { return picture_ ? ::finish(example_, device_, picture_) : example_.finish(); }
+int Viewer::finish() {
+    if (picture_) {
+        const Expected<Image> image = readImage(device_, picture_);
+        if (!image) return report(image.error());
+        if (Status status = example_.saveImage(*image); !status) return report(status.error());
+    }
+    return example_.finish();
+}

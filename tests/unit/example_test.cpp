@@ -99,6 +99,7 @@ TEST(Example, WrongArgumentsEndWithTwo) {
                                                          {"--screenshot"},
                                                          {"--turn", "2"},
                                                          {"--turn", "nan"},
+                                                         {"--turn", "-0.1"},
                                                          {"--many", "9"},
                                                          {"--unknown"},
                                                          {"stray"},

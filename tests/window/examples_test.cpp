@@ -76,6 +76,9 @@ TEST(WindowExample, Particles) {
     expectSame("02_hello_compute", "--time 0.5", {.channel = 5.5f / 255.0f, .texels = 1344});
 }
 
+// The same rays, from the same driver.
+TEST(WindowExample, Tracing) { expectSame("05_hello_tracing", "--time 0 --single", {}); }
+
 TEST(WindowExample, WithoutADisplayThereIsAPictureAllTheSame) {
     const TempDir folder;
     const std::string path = folder.path().string();

@@ -124,6 +124,16 @@ TEST_F(NullWindowTest, ClosesWithoutACallback) {
     EXPECT_TRUE(window.isClosed());
 }
 
+TEST_F(NullWindowTest, MayBeReleasedByItsCallback) {
+    window.setCloseCallback([this] {
+        window = {};
+        return true;
+    });
+    events.close = true;
+    EXPECT_FALSE(update());
+    EXPECT_EQ(window.state(), ObjectState::Null);
+}
+
 TEST_F(NullWindowTest, HasNoPictureWithoutAreaOrWhileHidden) {
     EXPECT_THAT(frame(), IsOk());
     events.width = 0;

@@ -41,7 +41,11 @@ bool WindowObject::update(Where where) {
     if (!check("update", where)) return false;
     nativeWindow().poll(was_skipped_ ? idle_time : 0);
     events_ = nativeWindow().takeEvents();
-    if (events_.close) closed = closed || !close_callback || close_callback();
+    if (events_.close) {
+        const Ref<WindowObject> keep_alive(this);  // the callback may let go of the last handle
+        closed = closed || !close_callback || close_callback();
+        return !closed;
+    }
     return !closed;
 }
 

@@ -90,7 +90,7 @@ Status WindowObject::present(Where where) {
     recorder->presentPicture(*picture_);
     RecorderCore* const lists[] = {recorder.get()};
     FenceObject& fence = *fences_[frame_ % fences_.size()];
-    const Status status = device()->submit(lists, &fence, where, &nativeWindow());
+    Status status = device()->submit(lists, &fence, where, &nativeWindow());
     const bool is_lost =
         !status && (status.error().code() == ErrorCode::DeviceLost || status.error().id() == "window.lost");
     if (is_lost) keep(status.error());

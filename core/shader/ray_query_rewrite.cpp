@@ -16,12 +16,13 @@ namespace {
 constexpr uint32_t version_1_3 = 0x10300;
 constexpr uint32_t version_1_4 = 0x10400;
 
-ShaderSource librarySource(const TracingRewrite& tracing) {
+ShaderSource librarySource(const TracingRewrite& tracing, uint32_t queries) {
     ShaderSource source;
     source.stage = ShaderStage::Compute;
     source.name = fmt::format("<library {}>", tracing.library);
     source.text = fmt::format("#include <{}>\nvoid main() {{}}\n", tracing.library);
-    source.macros = fmt::format("GLINT_TRACING_SET={}; {}", tracing.set, tracing.macros);
+    source.macros = fmt::format("GLINT_TRACING_SET={}; GLINT_TRACING_QUERIES={}; {}", tracing.set,
+                                std::max(queries, 1u), tracing.macros);
     return source;
 }
 
@@ -32,18 +33,20 @@ Error libraryError(const ShaderSource& source, const Error& error) {
 }
 
 /// The compiled library; one of each text and version is kept.
-Expected<std::shared_ptr<const SpirvModule>> compiledLibrary(const TracingRewrite& tracing, uint32_t version) {
+Expected<std::shared_ptr<const SpirvModule>> compiledLibrary(const TracingRewrite& tracing, uint32_t queries,
+                                                             uint32_t version) {
     static std::mutex& mutex = *new std::mutex;
     static auto& known = *new std::map<std::pair<std::string, uint32_t>, std::shared_ptr<const SpirvModule>>;
 
-    Expected<Preprocessed> text = preprocessLibrary(tracing);
+    const ShaderSource source = librarySource(tracing, queries);
+    Expected<Preprocessed> text = preprocess(source);
     if (!text) return unexpected(text.error());
     const std::pair<std::string, uint32_t> key(text->text, version);
     {
         std::lock_guard lock(mutex);
         if (const auto found = known.find(key); found != known.end()) return found->second;
     }
-    Expected<std::vector<uint32_t>> words = compileLibrary(librarySource(tracing), *text, version);
+    Expected<std::vector<uint32_t>> words = compileLibrary(source, *text, version);
     if (!words) return unexpected(words.error());
     if (const std::optional<std::string> fault = findFault(*words))
         return unexpected(makeError(ErrorCode::Internal, "shader.tracing_internal", "{}", *fault));
@@ -61,7 +64,9 @@ bool isStructure(const ShaderResource& resource) { return resource.element == Sl
 
 }  // namespace
 
-Expected<Preprocessed> preprocessLibrary(const TracingRewrite& tracing) { return preprocess(librarySource(tracing)); }
+Expected<Preprocessed> preprocessLibrary(const TracingRewrite& tracing) {
+    return preprocess(librarySource(tracing, 1));
+}
 
 Expected<std::vector<uint32_t>> rewriteRayQueries(const ShaderSource& source, std::span<const uint32_t> words,
                                                   Reflection& reflection) {
@@ -83,8 +88,8 @@ Expected<std::vector<uint32_t>> rewriteRayQueries(const ShaderSource& source, st
 
     Expected<SpirvModule> user = SpirvModule::parse(words);
     if (!user) return unexpected(libraryError(source, user.error()));
-    const Expected<std::shared_ptr<const SpirvModule>> library =
-        compiledLibrary(source.tracing, user->version < version_1_4 ? version_1_3 : version_1_4);
+    const Expected<std::shared_ptr<const SpirvModule>> library = compiledLibrary(
+        source.tracing, countRayQueries(*user), user->version < version_1_4 ? version_1_3 : version_1_4);
     if (!library) return unexpected(libraryError(source, library.error()));
     Expected<SpirvModule> linked =
         linkRayQueries(std::move(*user), reflection.entry, executionModel(reflection.stage), **library);

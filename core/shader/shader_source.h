@@ -62,7 +62,7 @@ std::vector<uint32_t> nativeWords(std::span<const uint32_t> words);
 /// GLSL of the SDK's own to SPIR-V of this version (0x10300 or 0x10400) with all its functions, called or not.
 Expected<std::vector<uint32_t>> compileLibrary(const ShaderSource& source, const Preprocessed& text, uint32_t version);
 
-/// The text of the library that a source is to be rewritten for.
+/// The text of the library that a source is to be rewritten for, as for one query.
 Expected<Preprocessed> preprocessLibrary(const TracingRewrite& tracing);
 
 /// SPIR-V's number of a stage.

@@ -22,7 +22,8 @@ struct GlintHit {
     bool front;
 };
 
-struct GlintRayQuery {
+struct GlintQuery {
+    uint number;
     uint top, flags, mask;
     vec3 origin, direction, object_origin, object_direction;
     float tmin;
@@ -75,15 +76,16 @@ bool glintTestBox(vec3 low, vec3 high, vec3 origin, vec3 direction, float tmin, 
     return tmin <= tmax;
 }
 
-void glintRayQueryInitialize(inout GlintRayQuery query, const GlintTracing tracing, const uint flags, const uint mask,
-                             const vec3 origin, const float tmin, const vec3 direction, const float tmax) {
-    query.top = tracing.x;
+void glintQueryInitialize(inout GlintQuery query, const uint number, const uint top, const uint flags, const uint mask,
+                          const vec3 origin, const float tmin, const vec3 direction, const float tmax) {
+    query.number = number;
+    query.top = top;
     query.flags = flags;
     query.mask = mask & 0xffu;
     query.origin = origin;
     query.direction = direction;
     query.tmin = tmin;
-    query.instances = tracing.x == ~0u ? 0u : glint_words[tracing.x];
+    query.instances = glint_words[top];
     query.instance = ~0u;  // none yet
     query.geometry = query.geometries = query.primitive = query.primitives = 0u;
     query.committed = query.candidate =
@@ -92,29 +94,29 @@ void glintRayQueryInitialize(inout GlintRayQuery query, const GlintTracing traci
     if (!(tmin <= tmax)) query.instances = 0u;
 }
 
-void glintRayQueryTerminate(inout GlintRayQuery query) {
+void glintQueryTerminate(inout GlintQuery query) {
     query.instances = 0u;
     query.geometries = 0u;
     query.primitives = 0u;
 }
 
-void glintRayQueryConfirmIntersection(inout GlintRayQuery query) {
+void glintQueryConfirm(inout GlintQuery query) {
     query.committed = query.candidate;
     query.committed.type = GLINT_COMMITTED_TRIANGLE;
-    if ((query.flags & GLINT_RAY_TERMINATE_ON_FIRST_HIT) != 0u)
+    if ((query.flags & GLINT_RAY_TERMINATE) != 0u)
         query.instances = query.geometries = query.primitives = 0u;
 }
 
-void glintRayQueryGenerateIntersection(inout GlintRayQuery query, const float t) {
+void glintQueryGenerate(inout GlintQuery query, const float t) {
     if (!(t >= query.tmin && t <= query.committed.t)) return;
     query.committed = query.candidate;
     query.committed.type = GLINT_COMMITTED_GENERATED;
     query.committed.t = t;
-    if ((query.flags & GLINT_RAY_TERMINATE_ON_FIRST_HIT) != 0u)
+    if ((query.flags & GLINT_RAY_TERMINATE) != 0u)
         query.instances = query.geometries = query.primitives = 0u;
 }
 
-bool glintRayQueryProceed(inout GlintRayQuery query) {
+bool glintQueryProceed(inout GlintQuery query) {
     for (;;) {
         if (query.primitive < query.primitives) {
             uint primitive = query.primitive++;
@@ -139,7 +141,7 @@ bool glintRayQueryProceed(inout GlintRayQuery query) {
                 if (!query.opaque) return true;
                 query.committed = query.candidate;
                 query.committed.type = GLINT_COMMITTED_TRIANGLE;
-                if ((query.flags & GLINT_RAY_TERMINATE_ON_FIRST_HIT) != 0u)
+                if ((query.flags & GLINT_RAY_TERMINATE) != 0u)
                     query.instances = query.geometries = query.primitives = 0u;
             } else {
                 uint word = query.first + 6u * primitive;
@@ -157,7 +159,7 @@ bool glintRayQueryProceed(inout GlintRayQuery query) {
             query.primitive = 0u;
             query.opaque = glint_words[record + 3u] != 0u;
             if ((query.instance_flags & GLINT_INSTANCE_OPAQUE) != 0u) query.opaque = true;
-            if ((query.instance_flags & GLINT_INSTANCE_TRANSPARENT) != 0u) query.opaque = false;
+            if ((query.instance_flags & GLINT_INSTANCE_NO_OPAQUE) != 0u) query.opaque = false;
             if ((query.flags & GLINT_RAY_OPAQUE) != 0u) query.opaque = true;
             if ((query.flags & GLINT_RAY_NO_OPAQUE) != 0u) query.opaque = false;
             uint skip = query.kind == 0u ? GLINT_RAY_SKIP_TRIANGLES : GLINT_RAY_SKIP_BOXES;
@@ -180,53 +182,53 @@ bool glintRayQueryProceed(inout GlintRayQuery query) {
     }
 }
 
-uint glintRayQueryGetIntersectionType(inout GlintRayQuery query, const bool committed) {
+uint glintQueryType(inout GlintQuery query, const bool committed) {
     return committed ? query.committed.type : query.candidate.type;
 }
-float glintRayQueryGetRayTMin(inout GlintRayQuery query) { return query.tmin; }
-uint glintRayQueryGetRayFlags(inout GlintRayQuery query) { return query.flags; }
-vec3 glintRayQueryGetWorldRayOrigin(inout GlintRayQuery query) { return query.origin; }
-vec3 glintRayQueryGetWorldRayDirection(inout GlintRayQuery query) { return query.direction; }
-float glintRayQueryGetIntersectionT(inout GlintRayQuery query, const bool committed) {
+float glintQueryTMin(inout GlintQuery query) { return query.tmin; }
+uint glintQueryFlags(inout GlintQuery query) { return query.flags; }
+vec3 glintQueryWorldRayOrigin(inout GlintQuery query) { return query.origin; }
+vec3 glintQueryWorldRayDirection(inout GlintQuery query) { return query.direction; }
+float glintQueryT(inout GlintQuery query, const bool committed) {
     return committed ? query.committed.t : query.candidate.t;
 }
-int glintRayQueryGetIntersectionInstanceId(inout GlintRayQuery query, const bool committed) {
+int glintQueryInstanceId(inout GlintQuery query, const bool committed) {
     return committed ? query.committed.instance : query.candidate.instance;
 }
-int glintRayQueryGetIntersectionGeometryIndex(inout GlintRayQuery query, const bool committed) {
+int glintQueryGeometryIndex(inout GlintQuery query, const bool committed) {
     return committed ? query.committed.geometry : query.candidate.geometry;
 }
-int glintRayQueryGetIntersectionPrimitiveIndex(inout GlintRayQuery query, const bool committed) {
+int glintQueryPrimitiveIndex(inout GlintQuery query, const bool committed) {
     return committed ? query.committed.primitive : query.candidate.primitive;
 }
-vec2 glintRayQueryGetIntersectionBarycentrics(inout GlintRayQuery query, const bool committed) {
+vec2 glintQueryBarycentrics(inout GlintQuery query, const bool committed) {
     return committed ? query.committed.barycentrics : query.candidate.barycentrics;
 }
-bool glintRayQueryGetIntersectionFrontFace(inout GlintRayQuery query, const bool committed) {
+bool glintQueryFrontFace(inout GlintQuery query, const bool committed) {
     return committed ? query.committed.front : query.candidate.front;
 }
-bool glintRayQueryGetIntersectionCandidateAABBOpaque(inout GlintRayQuery query) { return query.opaque; }
-int glintRayQueryGetIntersectionInstanceCustomIndex(inout GlintRayQuery query, const bool committed) {
+bool glintQueryCandidateBoxOpaque(inout GlintQuery query) { return query.opaque; }
+int glintQueryInstanceCustomIndex(inout GlintQuery query, const bool committed) {
     int instance = committed ? query.committed.instance : query.candidate.instance;
     return int(glint_words[glintInstanceWord(query.top, instance) + 24u] & 0xffffffu);
 }
-uint glintRayQueryGetIntersectionInstanceShaderBindingTableRecordOffset(inout GlintRayQuery query,
+uint glintQueryInstanceOffset(inout GlintQuery query,
                                                                         const bool committed) {
     int instance = committed ? query.committed.instance : query.candidate.instance;
     return glint_words[glintInstanceWord(query.top, instance) + 25u] & 0xffffffu;
 }
-mat4x3 glintRayQueryGetIntersectionObjectToWorld(inout GlintRayQuery query, const bool committed) {
+mat4x3 glintQueryObjectToWorld(inout GlintQuery query, const bool committed) {
     return glintRows(glintInstanceWord(query.top, committed ? query.committed.instance : query.candidate.instance));
 }
-mat4x3 glintRayQueryGetIntersectionWorldToObject(inout GlintRayQuery query, const bool committed) {
+mat4x3 glintQueryWorldToObject(inout GlintQuery query, const bool committed) {
     int instance = committed ? query.committed.instance : query.candidate.instance;
     return glintRows(glintInstanceWord(query.top, instance) + 12u);
 }
-vec3 glintRayQueryGetIntersectionObjectRayOrigin(inout GlintRayQuery query, const bool committed) {
+vec3 glintQueryObjectRayOrigin(inout GlintQuery query, const bool committed) {
     int instance = committed ? query.committed.instance : query.candidate.instance;
     return glintRows(glintInstanceWord(query.top, instance) + 12u) * vec4(query.origin, 1.0);
 }
-vec3 glintRayQueryGetIntersectionObjectRayDirection(inout GlintRayQuery query, const bool committed) {
+vec3 glintQueryObjectRayDirection(inout GlintQuery query, const bool committed) {
     int instance = committed ? query.committed.instance : query.candidate.instance;
     return glintRows(glintInstanceWord(query.top, instance) + 12u) * vec4(query.direction, 0.0);
 }

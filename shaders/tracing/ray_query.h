@@ -1,63 +1,63 @@
-// The interface between shaders with ray queries and the traversal of Glint's own tracing engine.
+// The interface between shaders with ray queries and a traversal library of Glint's own.
 //
-// A library is a file that includes this one, declares the engine's buffers in set GLINT_TRACING_SET, which is hidden
-// from users, and defines
+// A library is a file that declares the engine's buffers in set GLINT_TRACING_SET, which is hidden from users, and
+// defines
 //
-//     struct GlintRayQuery { ... };   // one query: all of its state; the library has no other
+//     struct GlintQuery { uint number; ... };   // a query's state
 //
 // and the functions below. Shaders rewritten for the software engine call them in the place of rayQuery*EXT, with the
-// same meaning (GL_EXT_ray_query): `committed` chooses between the committed and the candidate intersection, and what
-// GLSL leaves undefined may be any value, but never a crash or an endless loop for queries that were initialised. The
-// query is always `inout`, although most functions only read it, so that a call passes a place and no copy; all else is
-// `const`. Queries may be variables of a function or of the module: a function passes its query to none of its own.
-// Where a rewritten shader runs is not known: no built-in variables, no barriers, no derivatives.
+// same meaning (GL_EXT_ray_query): `committed` chooses between the committed intersection and the candidate. What GLSL
+// leaves undefined may be any value, but no endless loop for queries that were initialised.
 //
-//     void  glintRayQueryInitialize(inout GlintRayQuery query, const GlintTracing tracing, const uint flags,
-//                                   const uint mask, const vec3 origin, const float tmin, const vec3 direction,
-//                                   const float tmax)
-//     bool  glintRayQueryProceed(inout GlintRayQuery query)
-//     void  glintRayQueryTerminate(inout GlintRayQuery query)
-//     void  glintRayQueryConfirmIntersection(inout GlintRayQuery query)
-//     void  glintRayQueryGenerateIntersection(inout GlintRayQuery query, const float t)
-//     float glintRayQueryGetRayTMin(inout GlintRayQuery query)
-//     uint  glintRayQueryGetRayFlags(inout GlintRayQuery query)
-//     vec3  glintRayQueryGetWorldRayOrigin(inout GlintRayQuery query)
-//     vec3  glintRayQueryGetWorldRayDirection(inout GlintRayQuery query)
-//     bool  glintRayQueryGetIntersectionCandidateAABBOpaque(inout GlintRayQuery query)
+//     void  glintQueryInitialize(inout GlintQuery query, uint number, uint top, uint flags, uint mask, vec3 origin,
+//                                float t_min, vec3 direction, float t_max)
+//     bool  glintQueryProceed(inout GlintQuery query)
+//     void  glintQueryTerminate(inout GlintQuery query)
+//     void  glintQueryConfirm(inout GlintQuery query)
+//     void  glintQueryGenerate(inout GlintQuery query, float t)
+//     float glintQueryTMin(GlintQuery query)              vec3 glintQueryWorldRayOrigin(GlintQuery query)
+//     uint  glintQueryFlags(GlintQuery query)             vec3 glintQueryWorldRayDirection(GlintQuery query)
+//     bool  glintQueryCandidateBoxOpaque(GlintQuery query)
 //
-// and with (inout GlintRayQuery query, const bool committed), named glintRayQueryGetIntersection... each:
+// and with (GlintQuery query, bool committed)
 //
-//     uint  ...Type                    int   ...InstanceCustomIndex      vec3   ...ObjectRayOrigin
-//     float ...T                       int   ...InstanceId               vec3   ...ObjectRayDirection
-//     vec2  ...Barycentrics            int   ...GeometryIndex            mat4x3 ...ObjectToWorld
-//     bool  ...FrontFace               int   ...PrimitiveIndex           mat4x3 ...WorldToObject
-//     uint  ...InstanceShaderBindingTableRecordOffset
+//     uint  glintQueryType            int  glintQueryInstanceId            vec3   glintQueryObjectRayOrigin
+//     float glintQueryT               int  glintQueryInstanceCustomIndex   vec3   glintQueryObjectRayDirection
+//     vec2  glintQueryBarycentrics    int  glintQueryGeometryIndex         mat4x3 glintQueryObjectToWorld
+//     bool  glintQueryFrontFace       int  glintQueryPrimitiveIndex        mat4x3 glintQueryWorldToObject
+//     uint  glintQueryInstanceOffset
+//
+// `top` is what the engine gives out as the structure's address, its low word; with `uvec2 top` both words. Every query
+// of a shader has a number of its own below GLINT_TRACING_QUERIES, for state that is better kept in arrays beside the
+// structure; it is in `query.number` before the query is initialised.
+//
+// Calls pass the place of a query, also where a parameter is not declared `inout`: such a function must not write to
+// it. Where a rewritten shader runs is not known: no built-in variables, no barriers, no derivatives.
 #pragma once
 
-// What names an acceleration structure: the 64 bits that the engine gives out as its address, low word first. The
-// software engine's descriptor of a structure is a block of them, 16 bytes apart.
-#define GlintTracing uvec2
+#ifndef GLINT_TRACING_SET
+#define GLINT_TRACING_SET 0
+#endif
+#ifndef GLINT_TRACING_QUERIES
+#define GLINT_TRACING_QUERIES 1
+#endif
 
-// Ray flags, as in GLSL.
-#define GLINT_RAY_OPAQUE 1u
-#define GLINT_RAY_NO_OPAQUE 2u
-#define GLINT_RAY_TERMINATE_ON_FIRST_HIT 4u
-#define GLINT_RAY_CULL_BACK 16u
-#define GLINT_RAY_CULL_FRONT 32u
-#define GLINT_RAY_CULL_OPAQUE 64u
-#define GLINT_RAY_CULL_NO_OPAQUE 128u
-#define GLINT_RAY_SKIP_TRIANGLES 256u
-#define GLINT_RAY_SKIP_BOXES 512u
-
-// Instance flags: those of Tracing::InstanceFlag, in the same order.
-#define GLINT_INSTANCE_CULL_DISABLE 1u
-#define GLINT_INSTANCE_FLIP_FACING 2u
-#define GLINT_INSTANCE_OPAQUE 4u
-#define GLINT_INSTANCE_TRANSPARENT 8u
-
-// What rayQueryGetIntersectionTypeEXT says of a committed intersection and of a candidate.
-#define GLINT_COMMITTED_NONE 0u
-#define GLINT_COMMITTED_TRIANGLE 1u
-#define GLINT_COMMITTED_GENERATED 2u
-#define GLINT_CANDIDATE_TRIANGLE 0u
-#define GLINT_CANDIDATE_BOX 1u
+// Flags of rays and instances, kinds of intersections: the numbers of Vulkan.
+const uint GLINT_RAY_OPAQUE = 1u;
+const uint GLINT_RAY_NO_OPAQUE = 2u;
+const uint GLINT_RAY_TERMINATE = 4u;
+const uint GLINT_RAY_CULL_BACK = 16u;
+const uint GLINT_RAY_CULL_FRONT = 32u;
+const uint GLINT_RAY_CULL_OPAQUE = 64u;
+const uint GLINT_RAY_CULL_NO_OPAQUE = 128u;
+const uint GLINT_RAY_SKIP_TRIANGLES = 256u;
+const uint GLINT_RAY_SKIP_BOXES = 512u;
+const uint GLINT_INSTANCE_CULL_DISABLE = 1u;
+const uint GLINT_INSTANCE_FLIP_FACING = 2u;
+const uint GLINT_INSTANCE_OPAQUE = 4u;
+const uint GLINT_INSTANCE_NO_OPAQUE = 8u;
+const uint GLINT_COMMITTED_NONE = 0u;
+const uint GLINT_COMMITTED_TRIANGLE = 1u;
+const uint GLINT_COMMITTED_GENERATED = 2u;
+const uint GLINT_CANDIDATE_TRIANGLE = 0u;
+const uint GLINT_CANDIDATE_BOX = 1u;

@@ -552,7 +552,7 @@ TEST_F(RewriteGpuTest, FormsOfStructuresAndQueries) {
     for (size_t i = 0; i < 2; i++) tops[i] = encode(scenes[i], words);
     const Buffer buffer = makeBuffer(words);
     const std::array<uint32_t, 4> one = {tops[1], 0, 0, 0};
-    const std::array<uint32_t, 12> many = {~0u, 0, 0, 0, tops[0], 0, 0, 0, tops[1], 0, 0, 0};
+    const std::array<uint32_t, 12> many = {0, 0, 0, 0, tops[0], 0, 0, 0, tops[1], 0, 0, 0};
     const auto trace = [&](const Kernel& kernel, const auto& references) {
         return run(kernel, rays, {}, [&](Compute& list) {
             list.setUniform(Slot::at(0, 0), references);

@@ -226,9 +226,9 @@ constexpr Case cases[] = {
         rayQueryGetIntersectionGeometryIndexEXT(q, true), rayQueryGetIntersectionPrimitiveIndexEXT(q, true)), rayQueryGetIntersectionFrontFaceEXT(q, true)); }
         void main() { Hit hits[2]; hits[0] = trace(Ray(vec3(0), 0.0, vec3(1), 1.0)); hits[1] = trace(Ray(hits[0].uv.xyx, 0.0, vec3(1), hits[0].t));
         result[0] = hits[INDEX & 1u].t; })"},
-    {"NamesLikeTheLibrarys", R"(struct GlintRayQuery { int a; }; struct GlintHit { float b; }; float glint_words[3];
-        float glintRayQueryProceed(GlintRayQuery q) { return float(q.a) + glint_words[1]; }
-        void main() { rayQueryEXT q; rayQueryInitializeEXT(q, scene, RAY); rayQueryProceedEXT(q); GlintHit h; h.b = glintRayQueryProceed(GlintRayQuery(3)); result[0] = h.b; })"},
+    {"NamesLikeTheLibrarys", R"(struct GlintQuery { int a; }; struct GlintHit { float b; }; float glint_words[3];
+        float glintQueryProceed(GlintQuery q) { return float(q.a) + glint_words[1]; }
+        void main() { rayQueryEXT q; rayQueryInitializeEXT(q, scene, RAY); rayQueryProceedEXT(q); GlintHit h; h.b = glintQueryProceed(GlintQuery(3)); result[0] = h.b; })"},
     {"EarlyReturn", R"(void main() { if (INDEX > 100u) return; rayQueryEXT q; rayQueryInitializeEXT(q, scene, RAY);
         for (;;) { if (!rayQueryProceedEXT(q)) { result[0] = 1.0; return; } } })"},
     {"Printf",
@@ -280,8 +280,8 @@ void expectFree(std::span<const uint32_t> words) {
     EXPECT_EQ(countInstructions(words, spv::OpTypeRayQueryKHR), 0u);
     EXPECT_EQ(countInstructions(words, spv::OpTypeAccelerationStructureKHR), 0u);
     for (size_t i = 5; i < words.size(); i += words[i] >> 16) {
-        if ((words[i] & 0xffff) == spv::OpExtension)
-            EXPECT_STRNE(reinterpret_cast<const char*>(&words[i + 1]), "SPV_KHR_ray_query");
+        if ((words[i] & 0xffff) != spv::OpExtension) continue;
+        EXPECT_STRNE(reinterpret_cast<const char*>(&words[i + 1]), "SPV_KHR_ray_query");
     }
 }
 
@@ -345,10 +345,11 @@ TEST_P(RewriteCaseTest, IsValidFreeAndWhole) {
         EXPECT_EQ(before.name, after.name);
         EXPECT_EQ(before.set, after.set);
         EXPECT_EQ(before.count, after.count);
-        if (after.element != SlotKind::Tracing)
-            EXPECT_EQ(after.descriptor, after.element);
-        else
+        if (after.element == SlotKind::Tracing) {
             EXPECT_TRUE(after.descriptor == SlotKind::Uniform || after.descriptor == SlotKind::Storage);
+        } else {
+            EXPECT_EQ(after.descriptor, after.element);
+        }
     }
     for (const ShaderResource& resource : result->reflection.hidden) {
         EXPECT_EQ(resource.set, source.tracing.set);
@@ -495,17 +496,17 @@ TEST_F(RewriteTest, FaultsOfALibraryAreInternal) {
         source.tracing.library = "mine/library.h";
         return compileShader(source);
     };
-    const std::string head = "#define GlintTracing uvec2\nstruct GlintRayQuery { uint x; };\n";
-    const std::string initialize = "void glintRayQueryInitialize(inout GlintRayQuery q, const GlintTracing s, const "
+    const std::string head = "struct GlintQuery { uint number; uint x; };\n";
+    const std::string initialize = "void glintQueryInitialize(inout GlintQuery q, const uint n, const uvec2 s, const "
                                    "uint f, const uint m, const vec3 o, "
                                    "const float a, const vec3 d, const float b) { q.x = s.x; }\n";
-    const std::string proceed = "bool glintRayQueryProceed(inout GlintRayQuery q) { return q.x-- != 0u; }\n";
+    const std::string proceed = "bool glintQueryProceed(inout GlintQuery q) { return q.x-- != 0u; }\n";
     EXPECT_THAT(with(head + initialize + proceed), IsOk());
     EXPECT_THAT(with(head + initialize), HasErrorId("shader.tracing_internal"));  // lacks a function
     EXPECT_THAT(with(head + proceed), HasErrorId("shader.tracing_internal"));     // lacks the first
-    EXPECT_THAT(with("#define GlintTracing vec2\nstruct GlintRayQuery { float x; };\n" + initialize + proceed),
+    EXPECT_THAT(with("#define uvec2 vec2\nstruct GlintQuery { uint number; float x; };\n" + initialize + proceed),
                 HasErrorId("shader.tracing_internal"));
-    EXPECT_THAT(with(head + initialize + "void glintRayQueryProceed(inout GlintRayQuery q) {}\n"),
+    EXPECT_THAT(with(head + initialize + "void glintQueryProceed(inout GlintQuery q) {}\n"),
                 HasErrorId("shader.tracing_internal"));
     EXPECT_THAT(with(head + "syntax error"), HasErrorId("shader.tracing_internal"));
     ShaderSource missing = sourceOf(cases[1]);
@@ -516,14 +517,13 @@ TEST_F(RewriteTest, FaultsOfALibraryAreInternal) {
 TEST_F(RewriteTest, TheLibraryMayBeLooselyWritten) {
     // Parameters that are not const, helpers that take the query, own types and constants beside the user's.
     include("mine/library.h", R"(
-#define GlintTracing uvec2
-struct GlintRayQuery { uint count; vec3 origin; uint stack[4]; };
+struct GlintQuery { uint number, count; vec3 origin; uint stack[4]; };
 layout(set = GLINT_TRACING_SET, binding = 0) uniform sampler2D maps[2];
 layout(set = GLINT_TRACING_SET, binding = 3, rgba32ui) uniform readonly uimageBuffer nodes;
-uint advance(inout GlintRayQuery q, uint step) { q.count += step; q.stack[q.count & 3u] = imageLoad(nodes, int(step)).y; return q.count; }
-void glintRayQueryInitialize(inout GlintRayQuery q, const GlintTracing s, uint f, uint m, vec3 o, float a, vec3 d, float b) {
+uint advance(inout GlintQuery q, uint step) { q.count += step; q.stack[q.count & 3u] = imageLoad(nodes, int(step)).y; return q.count; }
+void glintQueryInitialize(inout GlintQuery q, const uint n, const uvec2 s, uint f, uint m, vec3 o, float a, vec3 d, float b) {
     q.count = s.x + f; q.origin = o; q.origin.y += textureLod(maps[1], d.xy, a).x; o.x = 3.0; advance(q, 2u); }
-bool glintRayQueryProceed(inout GlintRayQuery q) { precise float x = q.origin.x * q.origin.y + q.origin.z; return advance(q, 1u) < uint(x); }
+bool glintQueryProceed(inout GlintQuery q) { precise float x = q.origin.x * q.origin.y + q.origin.z; return advance(q, 1u) < uint(x); }
 )");
     ShaderSource source = sourceOf(cases[1]);
     source.tracing = {"mine/library.h", "", 5};

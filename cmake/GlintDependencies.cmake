@@ -32,7 +32,7 @@ find_path(GLINT_XXHASH_INCLUDE_DIR xxhash.h REQUIRED)
 find_library(GLINT_XXHASH_LIBRARY xxhash REQUIRED)
 add_library(glint_xxhash INTERFACE)
 target_include_directories(glint_xxhash SYSTEM INTERFACE "${GLINT_XXHASH_INCLUDE_DIR}")
-target_link_libraries(glint_xxhash INTERFACE "${GLINT_XXHASH_LIBRARY}")
+target_link_libraries(glint_xxhash INTERFACE xxhash)  # by name: its path here is nobody else's
 
 find_path(GLINT_STB_INCLUDE_DIR stb/stb_image.h REQUIRED)
 add_library(glint_stb INTERFACE)

@@ -40,6 +40,7 @@ public:
     void* map() const;
 };
 
+/// Both flags.
 constexpr Buffer::Flags operator|(Buffer::Flag a, Buffer::Flag b) {
     return static_cast<Buffer::Flags>(a) | static_cast<Buffer::Flags>(b);
 }

@@ -36,6 +36,7 @@ struct Message {
     Severity severity = Severity::Error;
     Error error;
 };
+/// Hears every message; from any thread, and must not call the device.
 using MessageCallback = std::function<void(const Message&)>;
 
 /// How a device is chosen and made.

@@ -35,6 +35,8 @@ enum Feature : uint64_t {
     FeaturePresent = 1ull << 24,           ///< windows
     FeatureCount = 25,
 };
+
+/// Features together.
 using FeatureMask = uint64_t;
 constexpr FeatureMask FeatureNone = 0;
 constexpr FeatureMask FeatureAll = (1ull << FeatureCount) - 1;

@@ -43,6 +43,7 @@ public:
     uint64_t getDataSize(uint32_t mip = 0) const;
 };
 
+/// Both flags.
 constexpr Texture::Flags operator|(Texture::Flag a, Texture::Flag b) {
     return static_cast<Texture::Flags>(a) | static_cast<Texture::Flags>(b);
 }

@@ -73,6 +73,7 @@ public:
     uint64_t getMemory() const;
 };
 
+/// Both flags.
 constexpr Tracing::Flags operator|(Tracing::Flag a, Tracing::Flag b) {
     return static_cast<Tracing::Flags>(a) | static_cast<Tracing::Flags>(b);
 }

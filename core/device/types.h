@@ -9,6 +9,7 @@ namespace glint {
 /// depth: "recorder.queue".
 enum class Queue : uint8_t { Main, Compute, Copy, Count };
 
+/// Linear red, green, blue and alpha.
 struct Color {
     float r = 0.0f, g = 0.0f, b = 0.0f, a = 1.0f;
     static constexpr Color black() { return {0.0f, 0.0f, 0.0f, 1.0f}; }

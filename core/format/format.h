@@ -29,6 +29,7 @@ enum Format : uint8_t {
 /// What a shader sees in a texel of a format.
 enum class FormatType : uint8_t { None, Float, Int, Uint, Depth };
 
+/// What there is to know about a format.
 struct FormatInfo {
     const char* name = "";  ///< "RGBAu8n"
     FormatType type = FormatType::None;
@@ -41,6 +42,7 @@ struct FormatInfo {
     bool compressed = false;
 };
 
+/// For a number that is no format what FormatUnknown has.
 const FormatInfo& formatInfo(Format format);
 inline const char* toString(Format format) { return formatInfo(format).name; }
 

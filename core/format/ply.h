@@ -19,8 +19,10 @@ enum class PlyType : uint8_t { Int8, Uint8, Int16, Uint16, Int32, Uint32, Float3
 /// Bytes of a value in a binary file.
 uint32_t sizeOf(PlyType type);
 
+/// How the values of a PLY file are written.
 enum class PlyEncoding : uint8_t { Ascii, LittleEndian, BigEndian };
 
+/// One value, or one list of values, of each record of an element.
 struct PlyProperty {
     std::string name;
     PlyType type = PlyType::Float32;  ///< of the value, or of each value of a list
@@ -30,6 +32,7 @@ struct PlyProperty {
     bool operator==(const PlyProperty&) const = default;
 };
 
+/// A table of a PLY file, such as its vertices.
 struct PlyElement {
     std::string name;
     uint64_t count = 0;     ///< records

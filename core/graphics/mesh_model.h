@@ -164,6 +164,7 @@ private:
     Buffer vertex_buffer_, index_buffer_;
 };
 
+/// Both flags.
 constexpr MeshModel::Flags operator|(MeshModel::Flag a, MeshModel::Flag b) {
     return static_cast<MeshModel::Flags>(a) | static_cast<MeshModel::Flags>(b);
 }

@@ -16,6 +16,7 @@
 
 namespace glint {
 
+/// Vectors of floats, doubles, and signed and unsigned numbers.
 using Vector2f = glm::vec2;
 using Vector3f = glm::vec3;
 using Vector4f = glm::vec4;
@@ -34,10 +35,11 @@ using Matrix3x3f = glm::mat3;
 using Matrix4x4f = glm::mat4;
 using Matrix4x4d = glm::dmat4;
 
+/// Angles: pi, and degrees to radians.
 constexpr float pi = 3.14159265358979323846f;
-
 constexpr float radians(float degrees) { return degrees * (pi / 180.0f); }
 
+/// True if no component is NaN or infinite.
 inline bool isFinite(const Vector3f& v) { return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z); }
 
 /// The matrix as a shader that is declared `layout(row_major)` reads it.
@@ -50,6 +52,7 @@ Matrix4x4f rotateZ(float degrees);
 Matrix4x4f translate(const Vector3f& offset);
 Matrix4x4f scale(const Vector3f& factors);
 
+/// The point (p, 1) transformed; for affine matrices.
 inline Vector3f transformPoint(const Matrix4x4f& matrix, const Vector3f& p) {
     return Vector3f(matrix * Vector4f(p, 1.0f));
 }

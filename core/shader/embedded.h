@@ -6,13 +6,14 @@
 
 namespace glint {
 
+/// One of these files.
 struct EmbeddedFile {
-    const char* name;  // relative to shaders/, with forward slashes
-    const char* text;  // ends with a zero that `size` does not count
-    size_t size;       // bytes
+    const char* name;  ///< relative to shaders/, with forward slashes
+    const char* text;  ///< ends with a zero that `size` does not count
+    size_t size;       ///< bytes
 };
 
-// In order of their names; valid for the life of the program. May be called from any thread.
+/// In order of their names; valid for the life of the program. May be called from any thread.
 std::span<const EmbeddedFile> embeddedShaders();
 
 }  // namespace glint

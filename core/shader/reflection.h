@@ -53,6 +53,7 @@ enum class SlotKind : uint8_t {
 /// "uniform", "storage", ...: the words messages use.
 const char* toString(SlotKind kind);
 
+/// The shape of an image, as the shader declares it.
 enum class ImageDimension : uint8_t { None, Image2D, Image3D, Cube, Image2DArray, CubeArray, Image2DMultisample };
 
 /// One resource as the shader declares it.

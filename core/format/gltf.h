@@ -15,6 +15,7 @@ namespace glint {
 /// decoded, and without `..`.
 using GltfReader = std::function<Expected<std::vector<std::byte>>(const std::string& name, uint64_t limit)>;
 
+/// What is read of a document, and how much of it.
 struct GltfOptions {
     /// Names the document in errors.
     std::string name = "glTF";

@@ -28,6 +28,7 @@ struct SceneTextureUse {
     bool operator==(const SceneTextureUse&) const = default;
 };
 
+/// What the alpha of a material means.
 enum class SceneAlpha : uint8_t {
     Opaque,  ///< alpha is passed over
     Mask,    ///< visible where alpha >= SceneMaterial::alpha_cutoff
@@ -59,6 +60,7 @@ struct SceneMaterial {
     bool operator==(const SceneMaterial&) const = default;
 };
 
+/// How an image is sampled: between its texels, and beyond its edges.
 enum class SceneFilter : uint8_t { Nearest, Linear };
 enum class SceneWrap : uint8_t { Repeat, Mirror, Clamp };
 
@@ -73,6 +75,7 @@ struct SceneTexture {
     bool operator==(const SceneTexture&) const = default;
 };
 
+/// A picture that materials use.
 struct SceneImage {
     std::string name;
     Image image;  ///< as decodePng and decodeJpeg give it; empty if images were not asked for
@@ -103,6 +106,7 @@ struct ScenePrimitive {
     bool operator==(const ScenePrimitive&) const = default;
 };
 
+/// Primitives that are drawn together.
 struct SceneMesh {
     std::string name;
     std::vector<ScenePrimitive> primitives;  ///< all with the same number of targets
@@ -120,6 +124,7 @@ struct SceneTransform {
     bool operator==(const SceneTransform&) const = default;
 };
 
+/// A place in the scene, with what stands there.
 struct SceneNode {
     std::string name;
     std::vector<uint32_t> children;    ///< of Scene::nodes: a forest, so no node has two parents
@@ -133,6 +138,7 @@ struct SceneNode {
     bool operator==(const SceneNode&) const = default;
 };
 
+/// The joints that move a mesh.
 struct SceneSkin {
     std::string name;
     std::vector<uint32_t> joints;          ///< of Scene::nodes
@@ -140,6 +146,7 @@ struct SceneSkin {
     bool operator==(const SceneSkin&) const = default;
 };
 
+/// What an animation changes of a node, and how it goes from key to key.
 enum class ScenePath : uint8_t { Translation, Rotation, Scale, Weights };
 enum class SceneInterpolation : uint8_t { Step, Linear, CubicSpline };
 
@@ -153,6 +160,7 @@ struct SceneChannel {
     bool operator==(const SceneChannel&) const = default;
 };
 
+/// Changes of several nodes over one time.
 struct SceneAnimation {
     std::string name;
     std::vector<SceneChannel> channels;  ///< no two of one node and path
@@ -161,6 +169,7 @@ struct SceneAnimation {
     bool operator==(const SceneAnimation&) const = default;
 };
 
+/// A camera without its place, which is its node's.
 struct SceneCamera {
     std::string name;
     bool is_perspective = true;
@@ -172,6 +181,7 @@ struct SceneCamera {
     bool operator==(const SceneCamera&) const = default;
 };
 
+/// Where light comes from: one direction, a point, or a point within a cone.
 enum class SceneLightType : uint8_t { Directional, Point, Spot };
 
 /// KHR_lights_punctual.

@@ -1,4 +1,4 @@
-// Uses an installed Glint as its users do: geometry, a shader that includes one of Glint's own, buffers, ray tracing, and
+// Uses an installed Glint as its users do: geometry, a shader that includes one of Glint's own, buffers, rays, and
 // Vulkan's handles. Prints "consumer: ok" if all the answers are right.
 
 #include <glint/geometry/primitives.h>
@@ -19,7 +19,8 @@ static int fail(const char* what, const Error& error = {}) {
 }
 
 int main() {
-    const Expected<PolygonMesh> torus = toLimit(createTorusQuads(1.07208f, 0.77792f, 16, 11), Subdivision::CatmullClark, 2);
+    const Expected<PolygonMesh> torus =
+        toLimit(createTorusQuads(1.07208f, 0.77792f, 16, 11), Subdivision::CatmullClark, 2);
     if (!torus) return fail("toLimit", torus.error());
     const Expected<Mesh> mesh = toTriangles(*torus);
     if (!mesh || mesh->triangleCount() != 5632) return fail("toTriangles");

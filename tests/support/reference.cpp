@@ -22,7 +22,7 @@ uint32_t ulpDistance(float a, float b) {
 namespace {
 
 #ifdef __SIZEOF_FLOAT128__
-__extension__ using Quad = __float128;
+__extension__ typedef __float128 Quad;
 #else
 using Quad = long double;  // of 113 bits where there is no __float128
 #endif

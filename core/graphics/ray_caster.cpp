@@ -243,6 +243,9 @@ Expected<RayCaster> RayCaster::create(const Device& device, const Mesh& mesh) {
                                     featureNames(FeatureComputeTracing)));
     if (Status status = mesh.validate(); !status && status.error().id() != "mesh.not_finite")
         return unexpected(status.error());
+    if (const uint64_t limit = device.getFeatures().maxTracingPrimitives; mesh.triangleCount() > limit)
+        return unexpected(makeError(ErrorCode::OutOfRange, "tracing.too_large",
+                                    "the mesh has {} triangles, the device takes {}", mesh.triangleCount(), limit));
     auto state = std::make_unique<State>();
     state->device = device;
     if (Status status = state->build(mesh); !status) return unexpected(status.error());

@@ -290,6 +290,8 @@ int run(const Options& options) {
     const bool is_text = options.disassemble || options.reflect || !options.language.empty();
     if (options.disassemble + options.reflect + !options.language.empty() + options.validate > 1)
         return failUsage("shader", "one of --disassemble, --reflect, --validate and --to at a time");
+    if (options.validate && !options.output.empty())
+        return failUsage("shader", "--validate writes nothing that -o could name");
     if (options.json && !options.reflect) return failUsage("shader", "--json goes with --reflect");
 
     const Expected<ShaderSource> source = readSource(options);
@@ -310,7 +312,7 @@ int run(const Options& options) {
         }();
         return text ? put(options, *text) : fail("shader", text.error());
     }
-    if (!options.output.empty() && !options.validate) {
+    if (!options.output.empty()) {
         const Status status = writeFile(options.output, std::as_bytes(std::span(*words)));
         if (!status) return fail("shader", status.error());
     }

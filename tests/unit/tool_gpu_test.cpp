@@ -146,6 +146,7 @@ TEST_F(Tool, ArgumentsThatAreWrong) {
     expectFailure("shader a.comp --to latin", 2, "tool.arguments");
     expectFailure("shader a.comp --reflect --disassemble", 2, "tool.arguments");
     expectFailure("shader a.comp --json", 2, "tool.arguments");
+    expectFailure("shader a.comp --validate -o a.spv", 2, "tool.arguments");
     for (const char* help : {"--help", "info --help", "shader --help", "cast --help"})
         EXPECT_NE(expectSuccess(help).output.find("Options"), std::string::npos);
 }

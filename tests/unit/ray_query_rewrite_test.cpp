@@ -3,6 +3,8 @@
 
 #include "shader_test.h"
 
+#include <glint/shader/convert.h>
+
 #include <spirv/unified1/spirv.hpp>
 
 #include <chrono>
@@ -674,6 +676,22 @@ TEST_F(RewriteTest, SpirvOfOtherCompilers) {
         ASSERT_THAT(paint, IsOk());
         expectFree(paint->words);
         EXPECT_TRUE(paint->reflection.hidden.empty());
+    }
+}
+
+TEST_F(RewriteTest, ConvertsToEveryLanguage) {
+    // With the driver's ray queries two of them refuse.
+    for (const char* name : {"TypeCompared", "TwoFunctionsWithQueries", "Matrices", "Fragment"}) {
+        const auto item = std::find_if(std::begin(cases), std::end(cases),
+                                       [&](const Case& other) { return other.name == std::string(name); });
+        ASSERT_NE(item, std::end(cases));
+        const Expected<Steps> result = steps(rewritten(sourceOf(*item)));
+        ASSERT_THAT(result, IsOk());
+        for (size_t i = 0; i < static_cast<size_t>(ShadingLanguage::Count); i++) {
+            const auto language = static_cast<ShadingLanguage>(i);
+            EXPECT_THAT(shader::convert(binary(result->words, item->stage), result->words, language), IsOk())
+                << name << " to " << toString(language);
+        }
     }
 }
 

@@ -275,7 +275,7 @@ Error ProgramObject::checkFeatures(const Reflection& stage, Where where) const {
     FeatureMask needed = 0;
     const bool tracing =
         stage.uses_ray_query || std::ranges::any_of(stage.resources, [](const ShaderResource& resource) {
-            return resource.kind == SlotKind::Tracing || resource.element == SlotKind::Tracing;
+            return resource.descriptor == SlotKind::Tracing;
         });
     if (tracing) needed |= stage.stage == ShaderStage::Compute ? FeatureComputeTracing : FeatureFragmentTracing;
     if (stage.uses_addresses) needed |= FeatureBufferAddress;

@@ -300,12 +300,13 @@ protected:
 
     /// The rewritten shader as the SPIR-V that it now is: the references are an ordinary block. Not optimised yet, so
     /// that what it declares and does not use keeps its slot.
-    static Shader softwareShader(const std::string& text, ShaderStage stage, Shader::Type type) {
+    static Shader softwareShader(const std::string& text, ShaderStage stage, Shader::Type type,
+                                 const char* library = "glint/tracing/plain.h") {
         ShaderSource source;
         source.stage = stage;
         source.text = text;
         source.name = "test.shader";
-        source.tracing.library = "glint/tracing/plain.h";
+        source.tracing.library = library;
         const Expected<shader::Preprocessed> preprocessed = shader::preprocess(source);
         EXPECT_THAT(preprocessed, IsOk());
         const Expected<std::vector<uint32_t>> words = shader::compile(source, *preprocessed);
@@ -610,6 +611,46 @@ layout(set = 0, binding = 0) uniform accelerationStructureEXT )";
                     std::to_string(tops[1]) + R"(u, 0u)), RAY);
             uint n = loop(); hits[i] = describe(q, n); })",
                 one);
+}
+
+TEST_F(RewriteGpuTest, QueriesHaveNumbers) {
+    setShaderInclude("numbers.h", R"(
+struct GlintQuery { uint number; };
+void glintQueryInitialize(inout GlintQuery q, uint number, uint top, uint flags, uint mask, vec3 o, float t_min, vec3 d,
+                          float t_max) { q.number = number; }
+float glintQueryT(GlintQuery q, bool committed) { return float(q.number + 100 * GLINT_TRACING_QUERIES); })");
+    const std::string text = R"(
+layout(local_size_x = 1) in;
+layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
+layout(set = 0, binding = 1, std430) writeonly buffer Numbers { float numbers[6]; };
+#define RAY 0u, 0xffu, vec3(0.0), 0.0, vec3(1.0), 1.0
+rayQueryEXT everywhere;
+float inner() { rayQueryEXT q; rayQueryInitializeEXT(q, scene, RAY); return rayQueryGetIntersectionTEXT(q, true); }
+void start(rayQueryEXT q) { rayQueryInitializeEXT(q, scene, RAY); }
+void main() {
+    rayQueryEXT one, many[3];
+    start(everywhere);
+    start(one);
+    for (int i = 0; i < 3; i++) rayQueryInitializeEXT(many[i], scene, RAY);
+    for (int i = 0; i < 3; i++) numbers[i] = rayQueryGetIntersectionTEXT(many[i], true);
+    numbers[3] = rayQueryGetIntersectionTEXT(one, true);
+    numbers[4] = rayQueryGetIntersectionTEXT(everywhere, true);
+    numbers[5] = inner();
+})";
+    Kernel kernel = device.createKernel("numbers");
+    kernel.setShader(softwareShader(text, ShaderStage::Compute, Shader::TypeCompute, "numbers.h"));
+    setShaderInclude("numbers.h", "");
+    ASSERT_THAT(kernel.create(), IsOk());
+    const Buffer numbers = device.createBuffer(Buffer::FlagStorage, 6 * sizeof(float));
+    compute([&](Compute& list) {
+        list.setKernel(kernel);
+        list.setUniform(Slot::at(0, 0), std::array<uint32_t, 4>());
+        list.setStorageBuffer(Slot::at(0, 1), numbers);
+        list.dispatch(1);
+    });
+    std::vector<float> found = read<float>(numbers);
+    std::sort(found.begin(), found.end());
+    EXPECT_EQ(found, (std::vector<float>{600, 601, 602, 603, 604, 605}));
 }
 
 // A whole fragment shader: a picture from either engine.

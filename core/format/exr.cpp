@@ -84,14 +84,10 @@ Imf::FrameBuffer frameOf(Image& image, const std::vector<std::string>& channels,
 }  // namespace
 
 Expected<Image> decodeExr(std::span<const std::byte> bytes, uint64_t limit) {
-    const Expected<ExrHeader> header = parseExrHeader(bytes);
+    const Expected<ExrHeader> header = parseExrHeader(bytes, limit);
     if (!header) return unexpected(header.error());
     Expected<Image> image = Image::create(header->format, header->width, header->height, limit);
     if (!image) return image;
-    if (header->chunk_bytes > limit + (16u << 20))
-        return unexpected(makeError(ErrorCode::OutOfRange, "image.too_large",
-                                    "a block of {} bytes exceeds the limit of {} bytes and 16 MiB more",
-                                    header->chunk_bytes, limit));
     try {
         Input input(bytes, header->bytes);
         if (header->is_tiled) {

@@ -98,11 +98,11 @@ Expected<std::vector<std::byte>> encodePng(const Image& image);
 Expected<Image> decodeHdr(std::span<const std::byte> bytes, uint64_t limit = Image::default_limit);
 
 /// Makes a Radiance HDR file's bytes. For FormatRf16 and Rf32 (as gray), RGBf32, RGBAf16 and RGBAf32; alpha is dropped.
-/// RGBE has one exponent for three mantissas of 8 bits, which are rounded to nearest: a channel differs by at most 2/511 of
-/// the largest channel of its texel (half a unit; the largest has 128 of them or more, or 127.75 where it is about to round
-/// up to the next power of two). What RGBE has no place for is changed further: a texel whose largest channel is below
-/// 1e-32 becomes 0, negative values and NaN become 0, infinity and all above 255 * 2^119 = 1.69e38 become that. Errors:
-/// "image.hdr_format", "image.size_zero", "image.too_large" (more than 715827882 texels).
+/// RGBE has one exponent for three mantissas of 8 bits, which are rounded to nearest: a channel differs by at most
+/// 2/511 of the largest channel of its texel (half a unit; the largest has 128 of them or more, or 127.75 where it is
+/// about to round up to the next power of two). What RGBE has no place for is changed further: a texel whose largest
+/// channel is below 1e-32 becomes 0, negative values and NaN become 0, infinity and all above 255 * 2^119 = 1.69e38
+/// become that. Errors: "image.hdr_format", "image.size_zero", "image.too_large" (more than 715827882 texels).
 Expected<std::vector<std::byte>> encodeHdr(const Image& image);
 
 /// Reads an OpenEXR file's bytes: one part, scan lines or tiles (the largest level), any compression, channels of

@@ -3,6 +3,8 @@
 #include <glint/base/format_error.h>
 #include <glint/base/status.h>
 
+#include <zlib.h>
+
 #include <algorithm>
 #include <array>
 #include <map>
@@ -55,11 +57,12 @@ Error unsupported(fmt::format_string<Args...> format, Args&&... args) {
 
 class HeaderParser {
 public:
-    explicit HeaderParser(std::span<const std::byte> file) : file_(file) {}
+    HeaderParser(std::span<const std::byte> file, uint64_t limit) : file_(file), limit_(limit) {}
 
     Expected<ExrHeader> parse() {
         for (const auto step : {&HeaderParser::readVersion, &HeaderParser::readAttributes, &HeaderParser::judgeSize,
-                                &HeaderParser::judgeChannels, &HeaderParser::judgeChunks})
+                                &HeaderParser::judgeChannels, &HeaderParser::judgeChunks, &HeaderParser::judgeMemory,
+                                &HeaderParser::readChunks})
             if (Status status = (this->*step)(); !status) return unexpected(status.error());
         return std::move(header_);
     }
@@ -214,44 +217,133 @@ private:
     }
 
     Status judgeChunks() {
-        uint64_t texel_size = 0;
-        for (const auto& [name, channel] : channels_) texel_size += channel.type == ChannelType::Half ? 2 : 4;
+        for (const auto& [name, channel] : channels_) texel_size_ += channel.type == ChannelType::Half ? 2 : 4;
         const size_t compression_at = placeOf("compression");
-        const auto compression = static_cast<size_t>(file_[compression_at]);
-        if (compression >= strip_lines.size())
-            return malformed(compression_at, "compression {} is not known", compression);
-        uint64_t width = header_.width;
-        uint64_t height = std::min(strip_lines[compression], header_.height);
+        compression_ = static_cast<uint32_t>(file_[compression_at]);
+        if (compression_ >= strip_lines.size())
+            return malformed(compression_at, "compression {} is not known", compression_);
+        chunk_width_ = header_.width;
+        chunk_height_ = std::min(strip_lines[compression_], header_.height);
         if (header_.is_tiled) {
             const size_t place = placeOf("tiles");
-            width = u32(place);
-            height = u32(place + 4);
-            if (width < 1 || height < 1 || width > ExrHeader::max_side || height > ExrHeader::max_side)
-                return malformed(place, "tiles of {}x{} texels", width, height);
+            chunk_width_ = u32(place);
+            chunk_height_ = u32(place + 4);
+            if (chunk_width_ < 1 || chunk_height_ < 1 || std::max(chunk_width_, chunk_height_) > ExrHeader::max_side)
+                return malformed(place, "tiles of {}x{} texels", chunk_width_, chunk_height_);
         }
-        const uint64_t texels = width * height;
-        header_.chunk_bytes = texels > ~0ull / texel_size ? ~0ull : texels * texel_size;
         // Each has a place in the table of offsets, and a header.
-        const uint64_t chunks = ((header_.width + width - 1) / width) * ((header_.height + height - 1) / height);
-        const uint64_t least = header_.is_tiled ? 28 : 16;
-        const uint64_t rest = file_.size() - header_.bytes.size();
-        if (chunks > rest / least)
+        columns_ = (header_.width - 1) / chunk_width_ + 1;
+        const uint64_t chunks = columns_ * ((header_.height - 1) / chunk_height_ + uint64_t{1});
+        const uint64_t least = 8 + chunkHeaderSize();
+        if (chunks > (file_.size() - header_.bytes.size()) / least)
             return malformed(file_.size(),
                              "the file ends too early: {}x{} texels lie in {} blocks, of {} bytes at least",
                              header_.width, header_.height, chunks, least);
+        chunks_ = chunks;
         return {};
     }
 
+    Status judgeMemory() {
+        const uint64_t texels = static_cast<uint64_t>(header_.width) * header_.height;
+        if (texels > limit_ / formatInfo(header_.format).block_size)
+            return makeError(ErrorCode::OutOfRange, "image.too_large",
+                             "{}x{} texels of {} take more than the limit of {} bytes", header_.width, header_.height,
+                             toString(header_.format), limit_);
+        constexpr uint64_t more = 16u << 20;
+        const uint64_t chunk_texels = static_cast<uint64_t>(chunk_width_) * chunk_height_;
+        if (chunk_texels > (limit_ + std::min(more, UINT64_MAX - limit_)) / texel_size_)
+            return makeError(ErrorCode::OutOfRange, "image.too_large",
+                             "a block of {}x{} texels, {} bytes each, takes more than {} bytes and the limit of {}",
+                             chunk_width_, chunk_height_, texel_size_, more, limit_);
+        return {};
+    }
+
+    size_t chunkHeaderSize() const { return header_.is_tiled ? 20 : 8; }
+
+    /// Whether the chunks of the picture are there, and unpack to as many bytes as they have to: of short ones the
+    /// library makes texels from whatever its memory held before. The other kinds of packing it checks itself.
+    Status readChunks() {
+        const size_t table = header_.bytes.size();
+        for (uint64_t i = 0; i < chunks_; i++) {
+            const size_t entry = table + 8 * i;
+            const uint64_t offset = u32(entry) | static_cast<uint64_t>(u32(entry + 4)) << 32;
+            if (offset < table || offset > file_.size() || file_.size() - offset < chunkHeaderSize())
+                return malformed(entry, "block {} of {} lies at byte {}", i, chunks_, offset);
+            const auto x = static_cast<uint32_t>(i % columns_);
+            const auto y = static_cast<uint32_t>(i / columns_);
+            const bool is_named = header_.is_tiled ? u32(offset) == x && u32(offset + 4) == y && u32(offset + 8) == 0 &&
+                                                         u32(offset + 12) == 0
+                                                   : u32(offset) == u32(placeOf("dataWindow") + 4) + y * chunk_height_;
+            const uint64_t size = u32(offset + chunkHeaderSize() - 4);
+            const uint64_t unpacked = texel_size_ * std::min(chunk_width_, header_.width - x * chunk_width_) *
+                                      std::min(chunk_height_, header_.height - y * chunk_height_);
+            const size_t begin = offset + chunkHeaderSize();
+            if (!is_named || size == 0 || size > unpacked || size > file_.size() - begin)
+                return malformed(offset, "block {} of {} has {} bytes for {}, or is another one", i, chunks_, size,
+                                 unpacked);
+            // What does not become smaller is stored as it is.
+            if (size < unpacked && !unpacksTo(file_.subspan(begin, size), unpacked))
+                return malformed(offset, "block {} of {} does not unpack to {} bytes", i, chunks_, unpacked);
+        }
+        return {};
+    }
+
+    bool unpacksTo(std::span<const std::byte> packed, uint64_t size) const {
+        if (compression_ == 0) return false;
+        if (compression_ == 1) return runLength(packed) == size;
+        if (compression_ == 2 || compression_ == 3) return inflatedLength(packed, size) == size;
+        return true;
+    }
+
+    static uint64_t runLength(std::span<const std::byte> packed) {
+        uint64_t length = 0;
+        for (size_t at = 0; at < packed.size();) {
+            const auto code = static_cast<int8_t>(packed[at]);
+            const size_t bytes = code < 0 ? 1 + static_cast<size_t>(-code) : 2;
+            if (bytes > packed.size() - at) return 0;
+            length += code < 0 ? static_cast<uint64_t>(-code) : static_cast<uint64_t>(code) + 1;
+            at += bytes;
+        }
+        return length;
+    }
+
+    /// How much zlib makes of it, as far as `most` and a little more.
+    static uint64_t inflatedLength(std::span<const std::byte> packed, uint64_t most) {
+        z_stream stream = {};
+        if (inflateInit(&stream) != Z_OK) return 0;
+        std::array<Bytef, 16384> output;
+        stream.next_in = reinterpret_cast<z_const Bytef*>(const_cast<std::byte*>(packed.data()));
+        stream.avail_in = static_cast<uInt>(packed.size());
+        int result = Z_OK;
+        while (result == Z_OK && stream.total_out <= most) {
+            stream.next_out = output.data();
+            stream.avail_out = output.size();
+            result = inflate(&stream, Z_NO_FLUSH);
+        }
+        const uint64_t length = result == Z_STREAM_END ? stream.total_out : 0;
+        inflateEnd(&stream);
+        return length;
+    }
+
     std::span<const std::byte> file_;
+    uint64_t limit_ = 0;
     size_t at_ = 0;
     uint32_t flags_ = 0;
     std::map<std::string_view, std::pair<size_t, uint32_t>> attributes_;  // known ones: place and size of the value
     std::map<std::string_view, Channel> channels_;
+    uint64_t texel_size_ = 0;  // with all channels
+    uint32_t compression_ = 0;
+    uint32_t chunk_width_ = 0;
+    uint32_t chunk_height_ = 0;
+    uint64_t columns_ = 0;  // of chunks
+    uint64_t chunks_ = 0;
     ExrHeader header_;
 };
 
 }  // namespace
 
-Expected<ExrHeader> parseExrHeader(std::span<const std::byte> file) { return HeaderParser(file).parse(); }
+Expected<ExrHeader> parseExrHeader(std::span<const std::byte> file, uint64_t limit) {
+    return HeaderParser(file, limit).parse();
+}
 
 }  // namespace glint

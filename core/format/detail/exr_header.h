@@ -11,7 +11,8 @@
 namespace glint {
 
 /// What an EXR file says about its image before the texels, judged before OpenEXR sees it: the library allocates what a
-/// header asks for, whatever the size of the file.
+/// header asks for, whatever the size of the file, and makes texels of memory that it never wrote if a block is too
+/// short.
 struct ExrHeader {
     /// Beyond it OpenEXR's coordinates could overflow.
     static constexpr uint32_t max_side = 0x3fffffff;
@@ -21,7 +22,6 @@ struct ExrHeader {
     uint32_t width = 0;
     uint32_t height = 0;
     bool is_tiled = false;
-    uint64_t chunk_bytes = 0;  ///< one strip or tile with all channels of the file, unpacked
 
     /// The header for OpenEXR, as long as the file's own. Attributes that do not bear on the texels are given a type
     /// that is not known, so that the library takes them for plain bytes.
@@ -29,7 +29,8 @@ struct ExrHeader {
 };
 
 /// Errors: "image.exr_malformed", with the byte; "image.exr_unsupported" (several parts, deep data, subsampled or
-/// integer channels, luminance with chroma, channels of which no picture can be made).
-Expected<ExrHeader> parseExrHeader(std::span<const std::byte> file);
+/// integer channels, luminance with chroma, channels of which no picture can be made); "image.too_large" (the image
+/// exceeds `limit` bytes, or a strip or tile with all of the file's channels exceeds it by more than 16 MiB).
+Expected<ExrHeader> parseExrHeader(std::span<const std::byte> file, uint64_t limit);
 
 }  // namespace glint

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 
 namespace glint::test {
 
@@ -17,5 +18,10 @@ Allocations allocations();
 
 /// Bytes of physical memory that this process holds now.
 uint64_t residentMemory();
+
+/// By how many bytes the physical memory of this process grows at most while `run` runs, C libraries' included. Pages
+/// that are asked for and never touched do not count. 0 where the system does not tell, and under sanitizers, which
+/// take memory of their own.
+uint64_t peakMemory(const std::function<void()>& run);
 
 }  // namespace glint::test

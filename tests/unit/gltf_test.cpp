@@ -102,8 +102,8 @@ TEST(Gltf, PropertiesThatAreNotReadMayBeAnything) {
     const std::string plain = builder.text();
     builder.json["extras"] = json::parse(std::string(400, '[') + std::string(400, ']'));
     builder.json["nodes"][0]["extras"] = 1;
-    builder.json["nodes"][0]["extensions"] = {{"VENDOR_x", {{"a", {nullptr, "b"}}}}};
-    builder.json["meshes"][0]["extensions"] = {{"VENDOR_x", 1}};
+    builder.json["nodes"][0]["extensions"] = json::parse(R"({"VENDOR_x": {"a": [null, "b"]}})");
+    builder.json["meshes"][0]["extensions"]["VENDOR_x"] = 1;
     builder.json["extensionsUsed"] = 7;
     builder.json["accessors"][0]["min"] = "none";
     EXPECT_EQ(parse(builder.text()).value(), parse(plain).value());
@@ -143,14 +143,13 @@ TEST(Gltf, StridesAndOffsets) {
     // early.
     const std::vector<float> vertices = {0, 0, 0, 5, 6, 99, 1, 0, 0, 7, 8, 99, 0, 1, 0, 9, 10};
     GltfBuilder builder;
-    const int view = builder.view(std::as_bytes(std::span(vertices)));
+    builder.view(std::as_bytes(std::span(vertices)));
     builder.json["bufferViews"][0]["byteStride"] = 24;
-    const json position = {{"bufferView", view}, {"componentType", 5126}, {"count", 3}, {"type", "VEC3"}};
-    json texcoord = position;
-    texcoord["type"] = "VEC2";
-    texcoord["byteOffset"] = 12;
-    builder.json["accessors"] = {position, texcoord};
-    builder.json["meshes"] = {{{"primitives", {{{"attributes", {{"POSITION", 0}, {"TEXCOORD_0", 1}}}}}}}};
+    builder.json.merge_patch(json::parse(R"({
+        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3"},
+                      {"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC2", "byteOffset": 12}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}}]}]
+    })"));
     const Expected<Scene> scene = parse(builder.text());
     ASSERT_THAT(scene, IsOk());
     const ScenePrimitive& primitive = scene->meshes[0].primitives[0];
@@ -166,12 +165,13 @@ TEST(Gltf, SparseAccessors) {
     const std::vector<float> put = {7, 8, 9, 4, 5, 6};
     const int places = builder.view(std::as_bytes(std::span(at)));
     const int values = builder.view(std::as_bytes(std::span(put)));
-    const json sparse = {{"count", 2},
-                         {"indices", {{"bufferView", places}, {"componentType", 5123}}},
-                         {"values", {{"bufferView", values}}}};
+    json sparse = json::parse(R"({"count": 2, "indices": {"componentType": 5123}})");
+    sparse["indices"]["bufferView"] = places;
+    sparse["values"]["bufferView"] = values;
     builder.json["accessors"][0]["sparse"] = sparse;
-    builder.json["accessors"].push_back({{"componentType", 5126}, {"count", 3}, {"type", "VEC3"}, {"sparse", sparse}});
-    builder.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 1}}};
+    builder.json["accessors"][1] = json::parse(R"({"componentType": 5126, "count": 3, "type": "VEC3"})");
+    builder.json["accessors"][1]["sparse"] = sparse;
+    builder.json["meshes"][0]["primitives"][0]["targets"] = json::parse(R"([{"POSITION": 1}])");
     const Expected<Scene> scene = parse(builder.text());
     ASSERT_THAT(scene, IsOk());
     const ScenePrimitive& primitive = scene->meshes[0].primitives[0];
@@ -201,7 +201,7 @@ TEST(Gltf, StripsAndFans) {
 TEST(Gltf, WhatIsLeftOutIsSaid) {
     GltfBuilder builder = triangle();
     builder.mesh(corner, {{"mode", 1}});
-    builder.json["meshes"][1]["primitives"].push_back({{"attributes", json::object()}});
+    builder.json["meshes"][1]["primitives"][1]["attributes"] = json::object();
     json& attributes = builder.json["meshes"][0]["primitives"][0]["attributes"];
     attributes["TEXCOORD_2"] = builder.accessor(std::vector<float>(6), "VEC2");
     attributes["_OWN"] = 0;
@@ -234,34 +234,30 @@ TEST(Gltf, NormalsTangentsAndWeightsAreNormalised) {
 
 TEST(Gltf, Materials) {
     GltfBuilder builder;
-    builder.json["textures"] = {{{"sampler", 0}}, json::object(), {{"sampler", 1}}, {{"sampler", 2}}};
-    builder.json["samplers"] = {{{"magFilter", 9728}, {"minFilter", 9728}, {"wrapS", 33071}, {"wrapT", 33648}},
-                                {{"magFilter", 9729}, {"minFilter", 9984}},
-                                {{"minFilter", 9986}}};
-    builder.json["extensionsRequired"] = {"KHR_texture_transform", "KHR_materials_unlit"};
-    const json transform = {{"offset", {0.5, -1}}, {"rotation", 0.25}, {"scale", {2, 3}}, {"texCoord", 1}};
-    const json moved = {{"index", 2}, {"extensions", {{"KHR_texture_transform", transform}}}};
-    builder.json["materials"] = {
-        json::object(),
-        {{"name", "m"},
-         {"pbrMetallicRoughness",
-          {{"baseColorFactor", {0.25, 0.5, 0.75, 1}},
-           {"baseColorTexture", moved},
-           {"metallicFactor", 0.5},
-           {"roughnessFactor", 0},
-           {"metallicRoughnessTexture", {{"index", 1}}}}},
-         {"normalTexture", {{"index", 1}, {"texCoord", 1}, {"scale", -2}}},
-         {"occlusionTexture", {{"index", 3}, {"strength", 0.5}}},
-         {"emissiveTexture", {{"index", 2}}},
-         {"emissiveFactor", {0.5, 1, 0}},
-         {"alphaMode", "MASK"},
-         {"alphaCutoff", 0.75},
-         {"doubleSided", true},
-         {"extensions",
-          {{"KHR_materials_emissive_strength", {{"emissiveStrength", 4}}},
-           {"KHR_materials_ior", {{"ior", 1.25}}},
-           {"KHR_materials_transmission", {{"transmissionFactor", 0.5}, {"transmissionTexture", moved}}},
-           {"KHR_materials_unlit", json::object()}}}}};
+    builder.json.merge_patch(json::parse(R"({
+        "extensionsRequired": ["KHR_texture_transform", "KHR_materials_unlit"],
+        "textures": [{"sampler": 0}, {}, {"sampler": 1}, {"sampler": 2}],
+        "samplers": [{"magFilter": 9728, "minFilter": 9728, "wrapS": 33071, "wrapT": 33648},
+                     {"magFilter": 9729, "minFilter": 9984}, {"minFilter": 9986}],
+        "materials": [{}, {
+            "name": "m",
+            "pbrMetallicRoughness": {
+                "baseColorFactor": [0.25, 0.5, 0.75, 1],
+                "baseColorTexture": {"index": 2, "extensions": {"KHR_texture_transform":
+                    {"offset": [0.5, -1], "rotation": 0.25, "scale": [2, 3], "texCoord": 1}}},
+                "metallicFactor": 0.5, "roughnessFactor": 0, "metallicRoughnessTexture": {"index": 1}},
+            "normalTexture": {"index": 1, "texCoord": 1, "scale": -2},
+            "occlusionTexture": {"index": 3, "strength": 0.5},
+            "emissiveTexture": {"index": 2}, "emissiveFactor": [0.5, 1, 0],
+            "alphaMode": "MASK", "alphaCutoff": 0.75, "doubleSided": true,
+            "extensions": {
+                "KHR_materials_emissive_strength": {"emissiveStrength": 4},
+                "KHR_materials_ior": {"ior": 1.25},
+                "KHR_materials_transmission": {"transmissionFactor": 0.5, "transmissionTexture":
+                    {"index": 2, "extensions": {"KHR_texture_transform":
+                        {"offset": [0.5, -1], "rotation": 0.25, "scale": [2, 3], "texCoord": 1}}}},
+                "KHR_materials_unlit": {}}}]
+    })"));
     const Expected<Scene> scene = parse(builder.text());
     ASSERT_THAT(scene, IsOk());
     EXPECT_EQ(scene->materials.at(0), SceneMaterial()) << "the defaults are the specification's";
@@ -299,16 +295,18 @@ TEST(Gltf, Materials) {
 
 TEST(Gltf, CamerasAndLights) {
     GltfBuilder builder;
-    builder.json["cameras"] = {
-        {{"type", "perspective"}, {"perspective", {{"yfov", 1.5}, {"znear", 0.5}}}},
-        {{"type", "perspective"}, {"perspective", {{"yfov", 1}, {"znear", 0.5}, {"zfar", 9}, {"aspectRatio", 2}}}},
-        {{"type", "orthographic"}, {"orthographic", {{"xmag", 2}, {"ymag", -3}, {"znear", 0}, {"zfar", 4}}}}};
-    builder.json["extensions"]["KHR_lights_punctual"]["lights"] = {
-        {{"type", "directional"}, {"name", "sun"}, {"color", {1, 0.5, 0}}, {"intensity", 100}},
-        {{"type", "point"}, {"range", 8}},
-        {{"type", "spot"}, {"spot", {{"innerConeAngle", 0.25}, {"outerConeAngle", 0.5}}}},
-        {{"type", "spot"}}};
-    builder.node({{"camera", 2}, {"extensions", {{"KHR_lights_punctual", {{"light", 3}}}}}});
+    builder.json.merge_patch(json::parse(R"({
+        "nodes": [{"camera": 2, "extensions": {"KHR_lights_punctual": {"light": 3}}}],
+        "cameras": [
+            {"type": "perspective", "perspective": {"yfov": 1.5, "znear": 0.5}},
+            {"type": "perspective", "perspective": {"yfov": 1, "znear": 0.5, "zfar": 9, "aspectRatio": 2}},
+            {"type": "orthographic", "orthographic": {"xmag": 2, "ymag": -3, "znear": 0, "zfar": 4}}],
+        "extensions": {"KHR_lights_punctual": {"lights": [
+            {"type": "directional", "name": "sun", "color": [1, 0.5, 0], "intensity": 100},
+            {"type": "point", "range": 8},
+            {"type": "spot", "spot": {"innerConeAngle": 0.25, "outerConeAngle": 0.5}},
+            {"type": "spot"}]}}
+    })"));
     const Expected<Scene> scene = parse(builder.text());
     ASSERT_THAT(scene, IsOk());
     EXPECT_EQ(scene->nodes[0].camera, 2u);
@@ -325,11 +323,11 @@ TEST(Gltf, CamerasAndLights) {
 
 TEST(Gltf, Nodes) {
     GltfBuilder builder;
-    builder.node({{"children", {2, 1}}, {"translation", {1, 2, 3}}, {"rotation", {0, 0, 1, 0}}, {"scale", {4, 5, 6}}});
-    builder.node({{"matrix", {1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 0, 13, 14, 15, 1}}});
-    builder.node(json::object());
-    builder.node(json::object());
-    builder.json["scenes"] = {{{"nodes", {3}}}, {{"nodes", {3, 0}}}};
+    builder.json.merge_patch(json::parse(R"({
+        "nodes": [{"children": [2, 1], "translation": [1, 2, 3], "rotation": [0, 0, 1, 0], "scale": [4, 5, 6]},
+                  {"matrix": [1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 0, 13, 14, 15, 1]}, {}, {}],
+        "scenes": [{"nodes": [3]}, {"nodes": [3, 0]}]
+    })"));
     EXPECT_EQ(parse(builder.text())->roots, (std::vector<uint32_t>{3})) << "the first scene";
     builder.json["scene"] = 1;
     const Expected<Scene> scene = parse(builder.text());
@@ -344,30 +342,28 @@ TEST(Gltf, Nodes) {
 
 TEST(Gltf, SkinsAndAnimations) {
     GltfBuilder builder = triangle();
-    builder.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 0}}, json::object()};
-    builder.json["nodes"][0]["weights"] = {0.25, 0.5};
-    builder.node({{"children", {2}}});
-    builder.node(json::object());
     std::vector<float> matrices(32);
     for (size_t i = 0; i < 32; i++) matrices[i] = static_cast<float>(i);
-    const int bind = builder.accessor(matrices, "MAT4");
-    builder.json["skins"] = {{{"joints", {2, 1}}, {"inverseBindMatrices", bind}, {"name", "s"}}, {{"joints", {1}}}};
-    const int times = builder.accessor(std::vector<float>{0.5, 1.5}, "SCALAR");
-    const int turns = builder.accessor(std::vector<int16_t>{0, 0, 0, 32767, 0, 32767, 0, 0}, "VEC4", true);
-    const int weights = builder.accessor(std::vector<float>{1, 2, 3, 4}, "SCALAR");
-    const int splines = builder.accessor(std::vector<float>(18, 1.0f), "VEC3");
-    const auto channel = [](int sampler, int node, const char* path) {
-        return json{{"sampler", sampler}, {"target", {{"node", node}, {"path", path}}}};
-    };
-    builder.json["animations"] = {
-        {{"name", "a"},
-         {"samplers",
-          {{{"input", times}, {"output", turns}},
-           {{"input", times}, {"output", weights}, {"interpolation", "STEP"}},
-           {{"input", times}, {"output", splines}, {"interpolation", "CUBICSPLINE"}}}},
-         {"channels",
-          {channel(0, 1, "rotation"), channel(1, 0, "weights"), channel(2, 1, "scale"),
-           json{{"sampler", 0}, {"target", {{"path", "rotation"}}}}, channel(0, 1, "pointer")}}}};
+    // Accessors 1 to 5; 0 is the triangle's.
+    builder.accessor(matrices, "MAT4");
+    builder.accessor(std::vector<float>{0.5, 1.5}, "SCALAR");
+    builder.accessor(std::vector<int16_t>{0, 0, 0, 32767, 0, 32767, 0, 0}, "VEC4", true);
+    builder.accessor(std::vector<float>{1, 2, 3, 4}, "SCALAR");
+    builder.accessor(std::vector<float>(18, 1.0f), "VEC3");
+    builder.json["meshes"][0]["primitives"][0]["targets"] = json::parse(R"([{"POSITION": 0}, {}])");
+    builder.json.merge_patch(json::parse(R"({
+        "nodes": [{"mesh": 0, "weights": [0.25, 0.5]}, {"children": [2]}, {}],
+        "skins": [{"joints": [2, 1], "inverseBindMatrices": 1, "name": "s"}, {"joints": [1]}],
+        "animations": [{
+            "name": "a",
+            "samplers": [{"input": 2, "output": 3}, {"input": 2, "output": 4, "interpolation": "STEP"},
+                         {"input": 2, "output": 5, "interpolation": "CUBICSPLINE"}],
+            "channels": [{"sampler": 0, "target": {"path": "rotation"}},
+                         {"sampler": 0, "target": {"node": 1, "path": "rotation"}},
+                         {"sampler": 1, "target": {"node": 0, "path": "weights"}},
+                         {"sampler": 0, "target": {"node": 1, "path": "pointer"}},
+                         {"sampler": 2, "target": {"node": 1, "path": "scale"}}]}]
+    })"));
     const Expected<Scene> scene = parse(builder.text());
     ASSERT_THAT(scene, IsOk());
     EXPECT_EQ(scene->nodes[0].weights, (std::vector<float>{0.25f, 0.5f}));
@@ -390,10 +386,10 @@ TEST(Gltf, Images) {
     const std::vector<std::byte> png = encodePng(chequers()).value();
     GltfBuilder builder = triangle();
     const int view = builder.view(png);
-    builder.json["images"] = {{{"bufferView", view}, {"name", "i"}},
-                              {{"uri", "data:image/png;base64," + base64(png)}},
-                              {{"uri", "two%20words/%C3%A4.png"}}};
-    builder.json["textures"] = {{{"source", 2}, {"name", "t"}}};
+    builder.json["images"] = json::parse(R"([{"name": "i"}, {}, {"uri": "two%20words/%C3%A4.png"}])");
+    builder.json["images"][0]["bufferView"] = view;
+    builder.json["images"][1]["uri"] = "data:image/png;base64," + base64(png);
+    builder.json["textures"] = json::parse(R"([{"source": 2, "name": "t"}])");
     GltfOptions options;
     std::string asked;
     options.read = [&](const std::string& name, uint64_t) -> Expected<std::vector<std::byte>> {
@@ -430,7 +426,7 @@ TEST(Gltf, JpegImages) {
                 rgb.push_back(static_cast<uint8_t>(value));
     const std::vector<std::byte> jpeg = jpegOf(rgb, 32, 16);
     GltfBuilder builder = triangle();
-    builder.json["images"] = {{{"bufferView", builder.view(jpeg)}}};
+    builder.json["images"][0]["bufferView"] = builder.view(jpeg);
     const Expected<Scene> scene = parse(builder.text());
     ASSERT_THAT(scene, IsOk());
     const Image& image = scene->images.at(0).image;
@@ -472,7 +468,7 @@ TEST(Gltf, Files) {
     const TempDir dir;
     GltfBuilder builder = triangle();
     const std::vector<std::byte> png = encodePng(chequers()).value();
-    builder.json["images"] = {{{"uri", "textures/a.png"}}};
+    builder.json["images"][0]["uri"] = "textures/a.png";
     json document = json::parse(builder.text());
     const std::string uri = document["buffers"][0]["uri"];
     document["buffers"][0]["uri"] = "a%2Ebin";
@@ -509,8 +505,8 @@ TEST(Gltf, LimitsBoundWhatIsMade) {
     EXPECT_THAT(parse(builder.text(), options), IsOk());
     const json plain = builder.json;
 
-    builder.json["accessors"].push_back({{"componentType", 5126}, {"count", 1ull << 50}, {"type", "VEC3"}});
-    builder.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", 1}}};
+    builder.json["accessors"][1] = json::parse(R"({"componentType": 5126, "count": 1125899906842624, "type": "VEC3"})");
+    builder.json["meshes"][0]["primitives"][0]["targets"] = json::parse(R"([{"POSITION": 1}])");
     EXPECT_THAT(parse(builder.text(), options), HasErrorId("gltf.too_large")) << "zeros without a view";
     EXPECT_THAT(parse(builder.text()), HasErrorId("gltf.too_large"));
 
@@ -524,7 +520,7 @@ TEST(Gltf, LimitsBoundWhatIsMade) {
     EXPECT_THAT(parse(builder.text(), options), HasErrorId("gltf.too_large")) << "materials of two letters";
 
     builder.json = plain;
-    builder.json["images"] = {{{"uri", "a.png"}}};
+    builder.json["images"][0]["uri"] = "a.png";
     options.read = [](const std::string&, uint64_t) -> Expected<std::vector<std::byte>> {
         return encodePng(Image::create(FormatRGBAu8n, 200, 200).value());
     };

@@ -252,7 +252,8 @@ bool glintQueryEnterLeaf(inout GlintQuery query) {
     next.barycentrics = hit.weights.yz / hit.area;
     next.primitive = hit.primitive;
     next.geometry = hit.geometry & 0x7fffffffu;
-    next.front = hit.area > 0.0 != ((query.instance_flags & GLINT_INSTANCE_FLIP_FACING) != 0u);
+    // Seen along z, with x to the right, y is down: clockwise triangles have the positive area.
+    next.front = hit.area < 0.0 != ((query.instance_flags & GLINT_INSTANCE_FLIP_FACING) != 0u);
     next.opaque = glintQueryIsOpaque(query, hit.geometry);
     met = met && hit.t > query.t_min && !glintQueryCullsOpacity(query, next.opaque);
     met = met && (hit.t < query.committed.t ||
@@ -290,8 +291,9 @@ bool glintQueryProceed(inout GlintQuery query) {
 
 void glintQueryConfirm(inout GlintQuery query) { glintQueryCommit(query, GLINT_COMMITTED_TRIANGLE); }
 
-// Of a box candidate, at a distance that is not beyond what is committed.
+// Of a box candidate. A distance out of the ray's interval, or beyond what is committed, is none.
 void glintQueryGenerate(inout GlintQuery query, float t) {
+    if (!(t >= query.t_min && t <= query.committed.t)) return;
     query.candidate.t = t;
     glintQueryCommit(query, GLINT_COMMITTED_GENERATED);
 }

@@ -6,6 +6,7 @@
 
 #include <glint/geometry/primitives.h>
 #include <glint/shader/shader_compiler.h>
+#include <glint/tracing/detail/instances.h>
 
 #include <bit>
 #include <cmath>
@@ -192,6 +193,51 @@ protected:
         return top;
     }
 
+    /// The scene as the engine's traversal reads it; returns the first texel of its top level.
+    static uint32_t encode(const Scene& scene, std::vector<detail::Texel>& texels) {
+        std::vector<uint32_t> places;
+        std::vector<BoundBox> bounds;
+        const auto append = [&](const Expected<detail::Hierarchy>& hierarchy) {
+            EXPECT_THAT(hierarchy, IsOk());
+            const auto place = static_cast<uint32_t>(texels.size());
+            texels.insert(texels.end(), hierarchy->texels.begin(), hierarchy->texels.end());
+            return place;
+        };
+        for (const Bottom& bottom : scene.bottoms) {
+            std::vector<detail::TriangleGeometry> triangles;
+            std::vector<detail::BoxGeometry> boxes;
+            for (const Geometry& geometry : bottom.geometries) {
+                if (geometry.boxes.empty())
+                    triangles.push_back(
+                        {.positions = reinterpret_cast<const std::byte*>(geometry.mesh.positions.data()),
+                         .vertices = static_cast<uint32_t>(geometry.mesh.positions.size()),
+                         .indices = reinterpret_cast<const std::byte*>(geometry.mesh.indices.data()),
+                         .index = detail::TriangleGeometry::Index::Uint32,
+                         .triangles = static_cast<uint32_t>(geometry.mesh.indices.size() / 3),
+                         .opaque = bottom.opaque});
+                else
+                    boxes.push_back({.boxes = reinterpret_cast<const std::byte*>(geometry.boxes.data()),
+                                     .count = static_cast<uint32_t>(geometry.boxes.size() / 6),
+                                     .opaque = bottom.opaque});
+            }
+            const Expected<detail::Hierarchy> hierarchy =
+                boxes.empty() ? detail::buildHierarchy(triangles, detail::BuildMode::Quality)
+                              : detail::buildHierarchy(boxes, detail::BuildMode::Quality);
+            places.push_back(append(hierarchy));
+            bounds.push_back(detail::boundsOf(*hierarchy));
+        }
+        std::vector<detail::HierarchyInstance> instances;
+        for (size_t i = 0; i < scene.instances.size(); i++)
+            instances.push_back({.transform = Transform3x4(scene.transforms[i]),
+                                 .bounds = bounds[scene.used[i]],
+                                 .texel = places[scene.used[i]],
+                                 .custom_index = scene.instances[i].data,
+                                 .mask = scene.instances[i].mask,
+                                 .offset = scene.instances[i].offset,
+                                 .flags = scene.instances[i].flags});
+        return append(detail::buildHierarchy(instances, detail::BuildMode::Quality));
+    }
+
     /// The scene as the driver has it.
     Tracing build(const Scene& scene) {
         std::vector<Tracing> bottoms;
@@ -319,9 +365,9 @@ protected:
         return rewritten ? Shader::createSPIRV(type, *rewritten, "rewritten") : Shader();
     }
 
-    Kernel softwareKernel(const std::string& text) {
+    Kernel softwareKernel(const std::string& text, const char* library = "glint/tracing/plain.h") {
         Kernel kernel = device.createKernel("software");
-        kernel.setShader(softwareShader(text, ShaderStage::Compute, Shader::TypeCompute));
+        kernel.setShader(softwareShader(text, ShaderStage::Compute, Shader::TypeCompute, library));
         EXPECT_THAT(kernel.create(), IsOk());
         return kernel;
     }
@@ -350,28 +396,44 @@ protected:
     }
 
     void prepare() {
-        if (!driver_) driver_ = driverKernel(std::string(declarations) + std::string(simple));
-        if (!software_) software_ = softwareKernel(std::string(declarations) + std::string(simple));
+        const std::string text = std::string(declarations) + std::string(simple);
+        if (!driver_) driver_ = driverKernel(text);
+        if (!plain_) plain_ = softwareKernel(text);
+        if (!fast_) fast_ = softwareKernel(text, "glint/tracing/query.h");
     }
 
-    /// Both engines on one scene.
-    struct Pair {
-        std::vector<Hit> driver, software;
-    };
-
-    Pair compare(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
+    std::vector<Hit> castDriver(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
         prepare();
         const Tracing top = build(scene);
-        std::vector<uint32_t> words;
-        const std::array<uint32_t, 4> reference = {encode(scene, words), 0, 0, 0};
-        const Buffer buffer = makeBuffer(words);
-        Pair pair;
-        pair.driver = run(driver_, rays, call, [&](Compute& list) { list.setTracing(0, top); });
-        pair.software = run(software_, rays, call, [&](Compute& list) {
+        return run(driver_, rays, call, [&](Compute& list) { list.setTracing(0, top); });
+    }
+
+    /// By a rewritten shader; `Memory` is what its library reads.
+    template <class Memory>
+    std::vector<Hit> castSoftware(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
+        prepare();
+        std::vector<Memory> memory;
+        const std::array<uint32_t, 4> reference = {encode(scene, memory), 0, 0, 0};
+        const Buffer buffer = makeBuffer(memory);
+        return run(std::is_same_v<Memory, uint32_t> ? plain_ : fast_, rays, call, [&](Compute& list) {
             list.setUniform(Slot::at(0, 0), reference);
             list.setStorageBuffer(Slot::at(7, 0), buffer);
         });
-        return pair;
+    }
+    std::vector<Hit> castPlain(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
+        return castSoftware<uint32_t>(scene, rays, call);
+    }
+    std::vector<Hit> castFast(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
+        return castSoftware<detail::Texel>(scene, rays, call);
+    }
+
+    /// All engines give the same; returns how many rays hit.
+    size_t compare(const Scene& scene, const std::vector<Ray>& rays, const Call& call) {
+        const std::vector<Hit> driver = castDriver(scene, rays, call);
+        const size_t found = expectSame(scene, driver, castPlain(scene, rays, call));
+        SCOPED_TRACE("the engine's own traversal");
+        expectSame(scene, driver, castFast(scene, rays, call));
+        return found;
     }
 
     /// How far apart the engines' t may be. In the object's space every coordinate of the ray and of the corners is
@@ -404,11 +466,11 @@ protected:
     }
 
     /// The engines agree on every ray, but for those that pass an edge or meet two surfaces at once.
-    static size_t expectSame(const Scene& scene, const Pair& pair) {
+    static size_t expectSame(const Scene& scene, const std::vector<Hit>& driver, const std::vector<Hit>& software) {
         size_t found = 0, apart = 0;
-        EXPECT_EQ(pair.driver.size(), pair.software.size());
-        for (size_t i = 0; i < pair.driver.size(); i++) {
-            const Hit &a = pair.driver[i], &b = pair.software[i];
+        EXPECT_EQ(driver.size(), software.size());
+        for (size_t i = 0; i < driver.size(); i++) {
+            const Hit &a = driver[i], &b = software[i];
             SCOPED_TRACE(i);
             found += a.kind != 0;
             EXPECT_EQ(a.tmin, b.tmin);
@@ -439,17 +501,14 @@ protected:
                     EXPECT_NEAR(a.to_object[column][row], b.to_object[column][row], 1e-5);
                 }
         }
-        EXPECT_LE(apart, pair.driver.size() / 100);
+        EXPECT_LE(apart, driver.size() / 100);
         return found;
     }
 
-    static void TearDownTestSuite() {
-        driver_ = {};
-        software_ = {};
-    }
+    static void TearDownTestSuite() { driver_ = plain_ = fast_ = {}; }
 
     // Compiled once: the driver takes a second for it.
-    static inline Kernel driver_, software_;
+    static inline Kernel driver_, plain_, fast_;
 };
 
 }  // namespace
@@ -460,9 +519,9 @@ TEST_F(RewriteGpuTest, TrianglesWithEveryFlag) {
     for (const uint32_t flags : {0u, ray_opaque, ray_no_opaque, ray_cull_back, ray_cull_front, ray_cull_opaque,
                                  ray_cull_no_opaque, ray_opaque | ray_cull_back, ray_no_opaque | ray_cull_front}) {
         SCOPED_TRACE(flags);
-        EXPECT_GT(expectSame(scene, compare(scene, rays, {flags, 1})), 50u);
+        EXPECT_GT(compare(scene, rays, {flags, 1}), 50u);
     }
-    EXPECT_EQ(expectSame(scene, compare(scene, rays, {ray_opaque | ray_cull_opaque, 1})), 0u);
+    EXPECT_EQ(compare(scene, rays, {ray_opaque | ray_cull_opaque, 1}), 0u);
 }
 
 TEST_F(RewriteGpuTest, CandidatesAreChosenByTheShader) {
@@ -471,8 +530,8 @@ TEST_F(RewriteGpuTest, CandidatesAreChosenByTheShader) {
         const Scene scene = triangles(seed);
         for (const uint32_t confirm : {0u, 2u, 3u, 4u}) {
             SCOPED_TRACE(confirm);
-            EXPECT_GT(expectSame(scene, compare(scene, rays, {0, confirm})), 100u);
-            EXPECT_EQ(expectSame(scene, compare(scene, rays, {ray_no_opaque, confirm})) > 100u, confirm != 0u);
+            EXPECT_GT(compare(scene, rays, {0, confirm}), 100u);
+            EXPECT_EQ(compare(scene, rays, {ray_no_opaque, confirm}) > 100u, confirm != 0u);
         }
     }
 }
@@ -480,22 +539,27 @@ TEST_F(RewriteGpuTest, CandidatesAreChosenByTheShader) {
 TEST_F(RewriteGpuTest, FirstHitAndTermination) {
     const std::vector<Ray> rays = castRays(600);
     const Scene scene = triangles(4);
-    const Pair closest = compare(scene, rays, {0, 1}), first = compare(scene, rays, {ray_first, 1});
-    for (size_t i = 0; i < rays.size(); i++) {
-        if (nearEdge(closest.driver[i])) continue;
-        EXPECT_EQ(first.software[i].kind, closest.driver[i].kind) << i;
-        EXPECT_EQ(first.driver[i].kind, closest.driver[i].kind) << i;
-        EXPECT_GE(first.software[i].t, closest.software[i].t);
+    const std::vector<Hit> closest = castDriver(scene, rays, {0, 1});
+    for (const bool fast : {false, true}) {
+        SCOPED_TRACE(fast);
+        const auto cast = [&](const Call& call) {
+            return fast ? castFast(scene, rays, call) : castPlain(scene, rays, call);
+        };
+        const std::vector<Hit> first = cast({ray_first, 1});
+        for (size_t i = 0; i < rays.size(); i++) {
+            if (nearEdge(closest[i])) continue;
+            EXPECT_EQ(first[i].kind, closest[i].kind) << i;
+            if (first[i].kind) { EXPECT_GE(first[i].t, closest[i].t - tolerance(scene, closest[i])) << i; }
+        }
+        // Terminated at the first candidate: it is the only one, and nothing is committed among transparent surfaces.
+        size_t candidates = 0;
+        for (const Hit& hit : cast({ray_no_opaque, 5})) {
+            EXPECT_LE(hit.candidates, 1u);
+            candidates += hit.candidates;
+            EXPECT_EQ(hit.kind, 0u);
+        }
+        EXPECT_GT(candidates, 50u);
     }
-    // Terminated at the first candidate: it is the only one, and nothing is committed among transparent surfaces.
-    const Pair ended = compare(scene, rays, {ray_no_opaque, 5});
-    size_t candidates = 0;
-    for (const Hit& hit : ended.software) {
-        EXPECT_LE(hit.candidates, 1u);
-        candidates += hit.candidates;
-        EXPECT_EQ(hit.kind, 0u);
-    }
-    EXPECT_GT(candidates, 50u);
 }
 
 TEST_F(RewriteGpuTest, BoxesAreGenerated) {
@@ -510,7 +574,7 @@ TEST_F(RewriteGpuTest, BoxesAreGenerated) {
     const std::vector<Ray> rays = castRays(800);
     for (const uint32_t flags : {0u, ray_opaque, ray_cull_no_opaque, ray_no_opaque}) {
         SCOPED_TRACE(flags);
-        EXPECT_GT(expectSame(scene, compare(scene, rays, {flags, 1, boxes})), 100u);
+        EXPECT_GT(compare(scene, rays, {flags, 1, boxes}), 100u);
     }
 }
 
@@ -524,23 +588,19 @@ TEST_F(RewriteGpuTest, SkippedKindsOfPrimitives) {
     place(scene, 0, rotateX(40));
     place(scene, 1, rotateY(70));
     const std::vector<Ray> rays = castRays(400);
-    std::vector<uint32_t> words;
-    const std::array<uint32_t, 4> reference = {encode(scene, words), 0, 0, 0};
-    const Buffer buffer = makeBuffer(words);
-    prepare();
-    const auto kinds = [&](uint32_t flags) {
-        std::set<uint32_t> found;
-        for (const Hit& hit : run(software_, rays, {flags, 1, boxes}, [&](Compute& list) {
-                 list.setUniform(Slot::at(0, 0), reference);
-                 list.setStorageBuffer(Slot::at(7, 0), buffer);
-             }))
-            found.insert(hit.kind);
-        return found;
-    };
-    EXPECT_EQ(kinds(0), (std::set<uint32_t>{0, 1, 2}));
-    EXPECT_EQ(kinds(ray_skip_triangles), (std::set<uint32_t>{0, 2}));
-    EXPECT_EQ(kinds(ray_skip_boxes), (std::set<uint32_t>{0, 1}));
-    EXPECT_EQ(kinds(ray_skip_boxes | ray_skip_triangles), (std::set<uint32_t>{0}));
+    for (const bool fast : {false, true}) {
+        const auto kinds = [&](uint32_t flags) {
+            const Call call = {flags, 1, boxes};
+            std::set<uint32_t> found;
+            for (const Hit& hit : fast ? castFast(scene, rays, call) : castPlain(scene, rays, call))
+                found.insert(hit.kind);
+            return found;
+        };
+        EXPECT_EQ(kinds(0), (std::set<uint32_t>{0, 1, 2}));
+        EXPECT_EQ(kinds(ray_skip_triangles), (std::set<uint32_t>{0, 2}));
+        EXPECT_EQ(kinds(ray_skip_boxes), (std::set<uint32_t>{0, 1}));
+        EXPECT_EQ(kinds(ray_skip_boxes | ray_skip_triangles), (std::set<uint32_t>{0}));
+    }
 }
 
 // Structures in an array, as parameters and from an address; queries in an array, several at once, one of the module,
@@ -561,7 +621,7 @@ TEST_F(RewriteGpuTest, FormsOfStructuresAndQueries) {
         });
     };
     prepare();
-    const std::vector<Hit> expected = trace(software_, one);
+    const std::vector<Hit> expected = trace(plain_, one);
     const std::string head = "#define BRIEF\n" + std::string(declarations) + R"(
 #define RAY flags, rays[i].mask, rays[i].origin, 0.0, rays[i].direction, rays[i].maximum
 #define BEGIN uint i = gl_GlobalInvocationID.x; if (i >= count) return;

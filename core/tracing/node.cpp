@@ -9,6 +9,14 @@ namespace {
 
 double powerOfTwo(int exponent) { return std::bit_cast<double>(static_cast<uint64_t>(exponent + 1023) << 52); }
 
+// A node begins below its boxes by one unit of its scale, which is 2^12 steps at most, and a step for rounding.
+constexpr double margin_steps = 4097.0;
+
+/// The plane of child s in units of the node's scale: its byte, and those before it as a fraction.
+double planeOf(const uint32_t words[2], uint32_t s) {
+    return 128.0 + static_cast<int32_t>(words[s / 4] << (24 - 8 * (s & 3))) * 0x1p-24;
+}
+
 /// Smallest e with x <= 2^e, for finite x >= 0.
 int exponentAbove(double x) {
     if (x <= 0.0) return -1022;
@@ -38,8 +46,10 @@ Grid makeGrid(const Box4& bounds) {
     Grid grid;
     grid.step = static_cast<float>(powerOfTwo(step));
     const double inverse = powerOfTwo(-step);
-    for (int axis = 0; axis < 3; axis++)
-        grid.minimum[axis] = static_cast<float>(std::floor(lo[axis] * inverse) * powerOfTwo(step));
+    for (int axis = 0; axis < 3; axis++) {
+        const double below = std::floor(lo[axis] * inverse) - margin_steps;
+        grid.minimum[axis] = static_cast<float>(below * powerOfTwo(step));
+    }
     return grid;
 }
 
@@ -47,12 +57,11 @@ void Node::box(const Grid& grid, uint32_t s, double lo[3], double hi[3]) const {
     const uint32_t origin[3] = {words[0] & 0xfffffu, words[1] & 0xfffffu,
                                 words[0] >> 24 | words[1] >> 24 << 8 | (words[3] & 15u) << 16};
     const uint32_t exponent[3] = {words[0] >> 20 & 15u, words[1] >> 20 & 15u, words[3] >> 4 & 15u};
-    const uint32_t shift = 8 * (s & 3);
     for (uint32_t axis = 0; axis < 3; axis++) {
         const double base = double(grid.minimum[axis]) + double(origin[axis]) * double(grid.step);
         const double scale = double(grid.step) * powerOfTwo(static_cast<int>(exponent[axis]) - exponent_bias);
-        lo[axis] = base + scale * (words[4 + 4 * axis + s / 4] >> shift & 255u);
-        hi[axis] = base + scale * (words[6 + 4 * axis + s / 4] >> shift & 255u);
+        lo[axis] = base + scale * planeOf(words + 4 + 4 * axis, s);
+        hi[axis] = base + scale * planeOf(words + 6 + 4 * axis, s);
     }
 }
 
@@ -83,24 +92,35 @@ Node encodeNode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t le
         // Differences of floats may need more than 53 bits; products of powers of two and the planes themselves do not.
         // So the quotients may be rounded across a whole number, and comparing with the planes sets that right.
         const double minimum = grid.minimum[axis];
-        auto origin = static_cast<int64_t>((all_lo[axis] - minimum) * inverse_step);
-        if (minimum + static_cast<double>(origin) * step > all_lo[axis]) origin--;
-        const double base = minimum + static_cast<double>(origin) * step;
-        int exponent = std::max(exponentAbove((all_hi[axis] - base) * (1.0 / 255.0)), step_exponent - exponent_bias);
-        if (base + 255.0 * powerOfTwo(exponent) < all_hi[axis]) exponent++;
-        const double scale = powerOfTwo(exponent);
-        const double inverse = powerOfTwo(-exponent);
+        const double extent = double(all_hi[axis]) - all_lo[axis];
+        int exponent = std::max(exponentAbove(extent * (1.0 / 254.0)), step_exponent - exponent_bias);
+        int64_t origin;
+        double base;
+        double scale;
+        do {
+            scale = powerOfTwo(exponent++);
+            origin = static_cast<int64_t>((all_lo[axis] - scale - minimum) * inverse_step);
+            if (minimum + static_cast<double>(origin) * step > all_lo[axis] - scale) origin--;
+            base = minimum + static_cast<double>(origin) * step;
+        } while (base + 255.0 * scale < all_hi[axis]);
+        const double inverse = 1.0 / scale;
         origins[axis] = static_cast<uint32_t>(origin);
-        exponents[axis] = static_cast<uint32_t>(exponent - step_exponent + exponent_bias);
+        exponents[axis] = static_cast<uint32_t>(exponent - 1 - step_exponent + exponent_bias);
         for (uint32_t s = 0; s < count; s++) {
-            if (!(lo[s][axis] <= hi[s][axis])) continue;
-            auto below = static_cast<int32_t>((lo[s][axis] - base) * inverse);
-            below -= base + below * scale > lo[s][axis] ? 1 : 0;
-            auto above = static_cast<int32_t>((hi[s][axis] - base) * inverse);
-            above += base + above * scale < hi[s][axis] ? 1 : 0;
+            const bool empty = !(lo[s][axis] <= hi[s][axis]);
+            const double low = empty ? all_lo[axis] : lo[s][axis];
+            const double high = empty ? all_lo[axis] : hi[s][axis];
             const uint32_t shift = 8 * (s & 3);
-            planes[s / 4] |= static_cast<uint32_t>(below) << shift;
-            planes[2 + s / 4] |= static_cast<uint32_t>(above) << shift;
+            const uint32_t before = (1u << shift) - 1;
+            const double unit = 1.0 / static_cast<double>(1u << shift);
+            const double low_part = (planes[s / 4] & before) * unit;
+            auto below = static_cast<int32_t>((low - base) * inverse - low_part);
+            below -= base + (below + low_part) * scale > low ? 1 : 0;
+            const double high_part = (planes[2 + s / 4] & before) * unit;
+            auto above = static_cast<int32_t>((high - base) * inverse - high_part);
+            above += base + (above + high_part) * scale < high ? 1 : 0;
+            planes[s / 4] |= (static_cast<uint32_t>(below) ^ 128u) << shift;
+            planes[2 + s / 4] |= (static_cast<uint32_t>(above) ^ 128u) << shift;
         }
     }
     node.words[0] = origins[0] | exponents[0] << 20 | (origins[2] & 255u) << 24;

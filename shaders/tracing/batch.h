@@ -1,6 +1,5 @@
-// A kernel that finds the closest hits of rays in a buffer. GLINT_TRACING_REFILL 0: each lane traces one ray, best for
-// rays that go the same way; 1: of GLINT_TRACING_RAYS rays a lane, lanes that are done take the next ones, best for rays
-// that do not. It takes a thread for each ray, or one for each GLINT_TRACING_RAYS of them.
+// A kernel that finds the closest hits of rays in a buffer. GLINT_TRACING_REFILL 0: a thread for each ray, the form of
+// choice on lavapipe. 1: a thread for each GLINT_TRACING_RAYS rays, and lanes that are done take the next of them.
 //
 // The slots: texel buffer 0 (or what GLINT_TRACING_MEMORY says), uniform 0, storage 0 and 1: rays and hits.
 #pragma once
@@ -14,6 +13,8 @@
 #ifndef GLINT_TRACING_RAYS
 #define GLINT_TRACING_RAYS 16
 #endif
+// Steps between looking for idle lanes.
+#define GLINT_TRACING_STEPS 8
 #if GLINT_TRACING_REFILL
 #extension GL_KHR_shader_subgroup_basic : require
 #extension GL_KHR_shader_subgroup_ballot : require
@@ -56,14 +57,12 @@ struct GlintWay {
     uint node;      // whose children are in `list`
     uvec2 header;   // its words 2 and 3
     uint list;      // what is left of them after `slot`
-    int near;       // where the first of `list` begins at the earliest
     uint slot;      // the child to go to, NONE at the end
     uint stacked;
 };
 
 uint stack_nodes[GLINT_TRACING_STACK];
 uint stack_lists[GLINT_TRACING_STACK];
-int stack_nears[GLINT_TRACING_STACK];
 
 bool glintAtNode(GlintWay way) { return way.slot != GLINT_TRACING_NONE && !glintIsLeaf(way.header, way.slot); }
 bool glintAtLeaf(GlintWay way) { return way.slot != GLINT_TRACING_NONE && glintIsLeaf(way.header, way.slot); }
@@ -78,17 +77,15 @@ void glintBegin(uint index, out GlintWay way) {
     way.node = 0u;
     way.header = uvec2(0x100u, 0u);  // child 0 is node 1, the root
     way.list = GLINT_TRACING_EMPTY;
-    way.near = 0;
     way.slot = glintIsRay(ray.origin, ray.direction, ray.t_min, ray.t_max) ? 0u : GLINT_TRACING_NONE;
     way.stacked = 0u;
 }
 
-// The next child: of this node, or of the last one that has children left which begin before the closest hit.
+// The next child: of this node, or of the last one that has children left. (Keeping on the stack where these begin, and
+// passing over what lies beyond the closest hit, takes more time than it saves: docs/tracing.md.)
 void glintNext(inout GlintWay way) {
-    while (way.list == GLINT_TRACING_EMPTY && way.stacked > 0u) {
+    if (way.list == GLINT_TRACING_EMPTY && way.stacked > 0u) {
         way.stacked--;
-        way.near = stack_nears[way.stacked];
-        if (way.near > floatBitsToInt(way.t_max)) continue;
         way.list = stack_lists[way.stacked];
         way.node = stack_nodes[way.stacked];
         way.header = GLINT_TRACING_LOAD(way.space.base + 4u * way.node).zw;
@@ -102,11 +99,10 @@ void glintEnterNode(inout GlintWay way) {
     if (way.list != GLINT_TRACING_EMPTY) {
         stack_nodes[way.stacked] = way.node;
         stack_lists[way.stacked] = way.list;
-        stack_nears[way.stacked] = way.near;
         way.stacked++;
     }
     way.node = glintChildNode(way.header, way.slot);
-    way.list = glintNode(way.space, way.node, way.t_min, way.t_max, way.header, way.near);
+    way.list = glintNode(way.space, way.node, way.t_min, way.t_max, way.header);
     glintNext(way);
 }
 
@@ -139,9 +135,10 @@ void main() {
     if (index >= ray_count) return;
     GlintWay way;
     glintBegin(index, way);
+    // A node, then a leaf, in each turn: lanes that loop over nodes until all have come to a leaf wait longer.
     while (way.slot != GLINT_TRACING_NONE) {
-        while (glintAtNode(way)) glintEnterNode(way);
-        while (glintAtLeaf(way)) glintEnterLeaf(way);
+        if (glintAtNode(way)) glintEnterNode(way);
+        if (glintAtLeaf(way)) glintEnterLeaf(way);
     }
     glintStore(index, way);
 }
@@ -161,7 +158,7 @@ void main() {
         const uvec4 idles = subgroupBallot(idle);
         const uint idle_count = subgroupBallotBitCount(idles);
         const bool all_idle = idle_count == gl_SubgroupSize;
-        if (next < end ? idle_count * 3u >= gl_SubgroupSize : all_idle) {
+        if (next < end ? idle_count * 2u >= gl_SubgroupSize : all_idle) {
             if (idle) {
                 if (index < ray_count) glintStore(index, way);
                 index = next + subgroupBallotExclusiveBitCount(idles);
@@ -171,8 +168,10 @@ void main() {
             if (next >= end) return;
             next += idle_count;
         }
-        if (glintAtNode(way)) glintEnterNode(way);
-        if (glintAtLeaf(way)) glintEnterLeaf(way);
+        for (int step = 0; step < GLINT_TRACING_STEPS; step++) {
+            if (glintAtNode(way)) glintEnterNode(way);
+            if (glintAtLeaf(way)) glintEnterLeaf(way);
+        }
     }
 }
 

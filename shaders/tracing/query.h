@@ -45,7 +45,6 @@ const uint GLINT_COMMITTED_GENERATED = 2u;
 #define GLINT_QUERY_STACK (2 * GLINT_TRACING_STACK + 1)
 uint glint_query_nodes[GLINT_TRACING_QUERIES][GLINT_QUERY_STACK];
 uint glint_query_lists[GLINT_TRACING_QUERIES][GLINT_QUERY_STACK];
-int glint_query_nears[GLINT_TRACING_QUERIES][GLINT_QUERY_STACK];
 
 struct GlintIntersection {
     uint type;
@@ -73,7 +72,6 @@ struct GlintQuery {
     uint node;         // whose children are in `list`
     uvec2 header;      // its words 2 and 3
     uint list;         // what is left of them after `slot`
-    int near;          // where the first of `list` begins at the earliest
     uint slot;         // the child to go to; NONE when there is none left at this level
     uint stacked;
     uint bottom;          // entries of the top level when the ray is within an instance
@@ -96,7 +94,6 @@ void glintQueryRoot(inout GlintQuery query) {
     query.node = 0u;
     query.header = uvec2(0x100u, 0u);  // child 0 is node 1
     query.list = GLINT_TRACING_EMPTY;
-    query.near = 0;
     query.slot = 0u;
 }
 
@@ -121,10 +118,8 @@ void glintQueryInitialize(out GlintQuery query, uint number, uint top, uint flag
 }
 
 void glintQueryNext(inout GlintQuery query) {
-    while (query.list == GLINT_TRACING_EMPTY && query.stacked > query.bottom) {
+    if (query.list == GLINT_TRACING_EMPTY && query.stacked > query.bottom) {
         query.stacked--;
-        query.near = glint_query_nears[query.number][query.stacked];
-        if (query.near > floatBitsToInt(query.committed.t)) continue;
         query.list = glint_query_lists[query.number][query.stacked];
         query.node = glint_query_nodes[query.number][query.stacked];
         query.header = GLINT_TRACING_LOAD(query.space.base + 4u * query.node).zw;
@@ -138,15 +133,13 @@ void glintQueryPush(inout GlintQuery query) {
     if (query.list == GLINT_TRACING_EMPTY) return;
     glint_query_nodes[query.number][query.stacked] = query.node;
     glint_query_lists[query.number][query.stacked] = query.list;
-    glint_query_nears[query.number][query.stacked] = query.near;
     query.stacked++;
 }
 
 void glintQueryEnterNode(inout GlintQuery query) {
     glintQueryPush(query);
     query.node = glintChildNode(query.header, query.slot);
-    query.list =
-        glintNode(query.space, query.node, query.t_min, query.committed.t, query.header, query.near);
+    query.list = glintNode(query.space, query.node, query.t_min, query.committed.t, query.header);
     glintQueryNext(query);
 }
 
@@ -277,13 +270,14 @@ bool glintQueryEnterLeaf(inout GlintQuery query) {
 bool glintQueryProceed(inout GlintQuery query) {
     bool asks = false;
     while (!asks && (query.slot != GLINT_TRACING_NONE || query.inside)) {
-        while (query.slot != GLINT_TRACING_NONE && !glintIsLeaf(query.header, query.slot)) glintQueryEnterNode(query);
+        if (query.slot != GLINT_TRACING_NONE && !glintIsLeaf(query.header, query.slot)) glintQueryEnterNode(query);
         if (query.slot == GLINT_TRACING_NONE) {
             if (query.inside) glintQueryLeaveInstance(query);
-        } else if (query.inside) {
-            asks = glintQueryEnterLeaf(query);
-        } else {
-            glintQueryEnterInstance(query);
+        } else if (glintIsLeaf(query.header, query.slot)) {
+            if (query.inside)
+                asks = glintQueryEnterLeaf(query);
+            else
+                glintQueryEnterInstance(query);
         }
     }
     return asks;

@@ -88,8 +88,8 @@ GlintSpace glintSpace(uint base, vec3 origin, vec3 direction) {
 }
 
 // A node's children that the ray meets between t_min >= 0 and t_max, nearest first: their slots, four bits each, ended
-// by NONE. `second` is where the second one begins at the earliest, `header` the node's words 2 and 3.
-#define GLINT_PLANE(word, shift) float((word) >> (shift) & 255u)
+// by NONE. `header` is the node's words 2 and 3.
+#define GLINT_PLANE(word, shift) float(int((word) << (24 - shift)))
 #define GLINT_CHILD(s, nx, fx, ny, fy, nz, fz, shift)                                                        \
     int key##s;                                                                                              \
     {                                                                                                        \
@@ -110,7 +110,7 @@ GlintSpace glintSpace(uint base, vec3 origin, vec3 direction) {
         key##a = smaller;                         \
     }
 
-uint glintNode(GlintSpace space, uint node, float t_min, float t_max, out uvec2 header, out int second) {
+uint glintNode(GlintSpace space, uint node, float t_min, float t_max, out uvec2 header) {
     const uint texel = space.base + 4u * node;
     const uvec4 head = GLINT_TRACING_LOAD(texel);
     const uvec4 planes_x = GLINT_TRACING_LOAD(texel + 1u);
@@ -120,8 +120,9 @@ uint glintNode(GlintSpace space, uint node, float t_min, float t_max, out uvec2 
 
     const uvec3 exponents = uvec3(head.x << 3, head.y << 3, head.w << 19) & 0x07800000u;
     const uvec3 origin = uvec3(head.xy & 0xfffffu, head.x >> 24 | head.y >> 24 << 8 | (head.w & 15u) << 16);
-    const vec3 scale = uintBitsToFloat(exponents + space.scale_bits) * space.inverse;
-    const vec3 corner = (vec3(origin) * space.step + space.to_grid) * space.inverse;
+    const vec3 unit = uintBitsToFloat(exponents + space.scale_bits);
+    const vec3 corner = (vec3(origin) * space.step + space.to_grid + unit * 128.0) * space.inverse;
+    const vec3 scale = unit * space.inverse * 5.9604645e-8;  // 2^-24
     const vec3 near = corner - space.margin;
     const vec3 far = corner + space.margin;
 
@@ -154,7 +155,6 @@ uint glintNode(GlintSpace space, uint node, float t_min, float t_max, out uvec2 
     GLINT_SORT(1, 4) GLINT_SORT(3, 6)
     GLINT_SORT(1, 2) GLINT_SORT(3, 4) GLINT_SORT(5, 6)
 
-    second = key1 & ~15;
     return uint(key0 & 15 | (key1 & 15) << 4 | (key2 & 15) << 8 | (key3 & 15) << 12 | (key4 & 15) << 16 |
                 (key5 & 15) << 20 | (key6 & 15) << 24 | key7 << 28);
 }

@@ -63,6 +63,7 @@ Benchmark memoryBenchmark();
 Benchmark tracingSoftwareBenchmark();
 Benchmark tracingBuildBenchmark();
 Benchmark castBenchmark();
+Benchmark tracingLeaksBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

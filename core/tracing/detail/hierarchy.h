@@ -44,7 +44,8 @@ struct alignas(16) Texel {
 };
 
 /// A view of triangles in host memory: vertex i at `positions + i * stride`, three floats. A triangle with a coordinate
-/// that is NaN or infinite is inactive: no ray meets it. So is a box with one, or with min > max.
+/// that is NaN, infinite or beyond max_coordinate is inactive: no ray meets it. So is a box with one, or with min >
+/// max.
 struct TriangleGeometry {
     enum class Index : uint8_t { None, Uint16, Uint32 };
 
@@ -70,6 +71,7 @@ enum class BuildMode : uint8_t {
     Fast,     ///< along a Z-order curve: for structures that live for a frame
 };
 
+constexpr float max_coordinate = 0x1p100f;  // 1.27e30
 /// Largest number of nodes on a way from the root to a leaf, by construction; so the traversal's stack holds one entry
 /// less.
 constexpr uint32_t max_depth = 24;

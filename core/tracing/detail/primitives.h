@@ -23,11 +23,11 @@ struct Record {
 };
 static_assert(sizeof(Record) == 3 * sizeof(Texel));
 
-inline bool allFinite(const float* values, uint32_t count) {
-    // NaN and infinity times zero are NaN, and that stays.
-    float sum = 0.0f;
-    for (uint32_t i = 0; i < count; i++) sum += values[i] * 0.0f;
-    return sum == 0.0f;
+/// False for NaN too.
+inline bool allInRange(const float* values, uint32_t count) {
+    bool all = true;
+    for (uint32_t i = 0; i < count; i++) all &= std::abs(values[i]) <= max_coordinate;
+    return all;
 }
 
 inline Float4 load3(const float* p) {
@@ -68,7 +68,7 @@ struct TriangleReader {
             std::memcpy(values + size_t(3 * i), geometry.positions + vertex * geometry.stride, 12);
         }
     }
-    static bool active(const float values[9]) { return allFinite(values, 9); }
+    static bool active(const float values[9]) { return allInRange(values, 9); }
     static Box4 box(const float values[9]) {
         Box4 box;
         for (uint32_t i = 0; i < 3; i++) box.add(load3(values + size_t(3 * i)));
@@ -99,7 +99,7 @@ struct BoxReader {
         values[6] = values[7] = values[8] = 0.0f;
     }
     static bool active(const float values[9]) {
-        return allFinite(values, 6) && values[0] <= values[3] && values[1] <= values[4] && values[2] <= values[5];
+        return allInRange(values, 6) && values[0] <= values[3] && values[1] <= values[4] && values[2] <= values[5];
     }
     static Box4 box(const float values[9]) { return {load3(values), load3(values + 3)}; }
     static Error rangeError(const Geometry&, size_t, uint32_t) { return {}; }

@@ -50,7 +50,7 @@ const char* rayQueryFunction(uint32_t opcode) {
 }
 
 RayQueryLibrary::RayQueryLibrary(const SpirvModule& library, uint32_t offset, SpirvBuilder& builder)
-    : library_(library), offset_(offset), builder_(builder) {
+    : offset_(offset), builder_(builder) {
     for (const Instruction& name : library.names) {
         // "glintQueryProceed(struct-GlintQuery-...;" is how the compiler names a function.
         const std::string_view text = name.opcode == spv::OpName ? name.text(1) : std::string_view();

@@ -22,7 +22,8 @@ struct LibraryFunction {
 };
 
 /// Puts a library's types and variables into a module, as its first globals, and then those functions that are asked
-/// for. Ids of the library are moved up by `offset`. Throws RewriteRefusal, "shader.tracing_internal".
+/// for. Ids of the library, which has to outlive this, are moved up by `offset`. Throws RewriteRefusal,
+/// "shader.tracing_internal".
 class RayQueryLibrary {
 public:
     RayQueryLibrary(const SpirvModule& library, uint32_t offset, SpirvBuilder& builder);
@@ -52,7 +53,6 @@ private:
     void retarget(Instruction& item, const Instruction& original, const Import& import_item,
                   std::unordered_set<uint32_t>& queries);
 
-    const SpirvModule& library_;
     const uint32_t offset_;
     SpirvBuilder& builder_;
     std::map<std::string_view, uint32_t> names_;

@@ -84,7 +84,6 @@ void append(std::vector<uint32_t>& words, const Instructions& part) {
 
 Instruction::Instruction(uint32_t code, uint32_t type, uint32_t result, std::span<const uint32_t> operands,
                          size_t literals_from)
-
     : opcode(static_cast<uint16_t>(code)), has_type(type != 0), has_result(result != 0) {
     words.push_back(0);
     if (has_type) words.push_back(type);
@@ -107,8 +106,8 @@ Expected<SpirvModule> SpirvModule::parse(std::span<const uint32_t> words) {
     Parser parser;
     const spv_result_t result = spvBinaryParse(
         context.get(), &parser, words.data(), words.size(),
-        [](void* self, spv_endianness_t, uint32_t, uint32_t version, uint32_t, uint32_t bound, uint32_t) {
-            static_cast<Parser*>(self)->header(version, bound);
+        [](void* self, spv_endianness_t, uint32_t, uint32_t made_for, uint32_t, uint32_t ids, uint32_t) {
+            static_cast<Parser*>(self)->header(made_for, ids);
             return SPV_SUCCESS;
         },
         [](void* self, const spv_parsed_instruction_t* parsed) {

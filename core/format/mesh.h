@@ -36,10 +36,10 @@ struct Mesh {
     std::vector<uint32_t> indices;    ///< three for each triangle
     std::vector<MeshPart> parts;      ///< in the order of their triangles; empty means one part without a name
 
-    /// Reads a file; its ending says which format it has (".obj", see parseObj; ".ply", see parsePly; ".gltf" and ".glb":
-    /// the scene at rest, see Scene::mesh). Degenerate and repeated triangles are kept, and triangles keep the order of
-    /// the file. Errors: those of readFile, "mesh.unknown_extension" and those of the format; they name the file and the
-    /// line or the element.
+    /// Reads a file; its ending says which format it has (".obj", see parseObj; ".ply", see parsePly; ".gltf" and
+    /// ".glb": the scene at rest, see Scene::mesh). Degenerate and repeated triangles are kept, and triangles keep the
+    /// order of the file. Errors: those of readFile, "mesh.unknown_extension" and those of the format; they name the
+    /// file and the line or the element.
     static Expected<Mesh> load(const std::filesystem::path& path, uint64_t limit = default_limit);
 
     /// Writes a file, as its ending says (".ply", see encodePly). Errors: those of writeFile, "mesh.unknown_extension"

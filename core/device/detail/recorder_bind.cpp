@@ -328,7 +328,8 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
                                : e < slots[slot].elements.size() ? slots[slot].elements[e]
                                                                  : unset;
                 if (bindings_dirty_ && !checkBound(resource, kind, slot, bound, what, where)) return false;
-                if (kind == SlotKind::Uniform && offsets) offsets[uniform++] = static_cast<uint32_t>(bound.value.offset);
+                if (kind == SlotKind::Uniform && offsets)
+                    offsets[uniform++] = static_cast<uint32_t>(bound.value.offset);
                 if (!bindings_dirty_) continue;
                 BoundResource& element = elements[program_->first_element[index] + e];
                 if (kind == SlotKind::Sampler && resource.combined) {

@@ -124,7 +124,7 @@ void glintStore(uint ray, GlintWay way) {
     hits[ray].geometry = found ? way.best.geometry & 0x7fffffffu : 0xffffffffu;
     hits[ray].u = found ? way.best.weights.y / way.best.area : 0.0;
     hits[ray].v = found ? way.best.weights.z / way.best.area : 0.0;
-    hits[ray].front = found && way.best.area > 0.0 ? 1u : 0u;
+    hits[ray].front = found && way.best.area < 0.0 ? 1u : 0u;
     hits[ray].instance = found ? 0u : 0xffffffffu;
 }
 

@@ -185,8 +185,8 @@ float glintEqualProducts(vec2 a, vec2 b) {
     return difference;
 }
 
-// Where a ray meets a triangle. `weights` of the corners, not divided by their sum `area`, which is positive if the
-// corners are counter-clockwise seen from the origin.
+// Where a ray meets a triangle. `weights` of the corners, not divided by their sum `area`, which is negative if the
+// corners are counter-clockwise seen from the origin: the front.
 struct GlintTriangleHit {
     float t;
     float area;

@@ -256,7 +256,9 @@ TEST_F(TracingTraversal, KeepsToTheIntervalAndTheOrderOfTies) {
         EXPECT_EQ(hits[0].t, 2.0f);
         EXPECT_EQ(hits[0].u, 0.25f);
         EXPECT_EQ(hits[0].v, 0.5f);
-        EXPECT_NE(hits[0].front, hits[14].front) << "seen from the other side";
+        // The corners are counter-clockwise seen from above.
+        EXPECT_EQ(hits[0].front, 0u);
+        EXPECT_EQ(hits[14].front, 1u);
         EXPECT_EQ(trace(buildMesh(Mesh()), rays, refill)[0].primitive, none);
     }
 }
@@ -339,7 +341,7 @@ void main() {
             const float end = uint(TYPE(q, true)) == 0u ? ray.t_max : DISTANCE(q, true);
             if (rest > 0.0 && t > ray.t_min && t < end) GENERATE(q, t);
         } else {
-            // Policy 1 takes every other triangle, policy 2 none, and then all that there are have to be seen.
+            // Policy 1 takes every other triangle; policy 2 none, so that all that there are have to be seen.
             if (policy == 2u) candidates += id * 2654435761u;
             if (policy == 0u || (policy == 1u && (PRIMITIVE(q, false) & 1) == 0)) CONFIRM(q);
             if (policy == 3u) { CONFIRM(q); TERMINATE(q); }
@@ -384,6 +386,15 @@ struct QueryHit {
     Vector3f object_direction;
     float other;
 };
+
+std::string describe(size_t ray, const QueryHit& hit) {
+    return fmt::format(
+        "ray {}: type {} primitive {} geometry {} instance {} custom {} offset {} front {} candidates {} "
+        "barycentrics {} {} t {} origin {} {} {} direction {} {} {} matrices {} {}\n",
+        ray, hit.type, hit.primitive, hit.geometry, hit.instance, hit.custom, hit.offset, hit.front, hit.candidates,
+        hit.barycentrics.x, hit.barycentrics.y, hit.t, hit.object_origin.x, hit.object_origin.y, hit.object_origin.z,
+        hit.object_direction.x, hit.object_direction.y, hit.object_direction.z, hit.matrices, hit.other);
+}
 
 bool near(const Vector3f& a, const Vector3f& b, float bound) { return glm::length(a - b) <= bound; }
 
@@ -487,7 +498,9 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
     };
     std::vector<Case> cases;
     for (const uint32_t flags : {0u, 1u, 2u, 16u, 32u, 64u, 128u, 256u, 512u, 16u | 2u, 32u | 64u})
-        for (const uint32_t policy : {0u, 1u, 2u}) cases.push_back({flags, 0xff, policy});
+        for (const uint32_t policy : {0u, 1u}) cases.push_back({flags, 0xff, policy});
+    // Nothing may be committed on the way: that would end the ray, and what is seen before depends on the order.
+    for (const uint32_t flags : {2u | 512u, 2u | 16u | 512u}) cases.push_back({flags, 0xff, 2});
     cases.push_back({0, 0x15, 1});
     cases.push_back({0, 0, 0});
     cases.push_back({4, 0xff, 0});  // ends at the first hit, whichever that is: only whether there is one
@@ -513,6 +526,7 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
         // The driver's triangle test is another one: rays through edges may go either way. One in a thousand, at least.
         uint32_t differ = 0;
         uint32_t met = 0;
+        std::string detail;
         for (size_t i = 0; i < rays.size(); i++) {
             const QueryHit& ours = results[0][i];
             const QueryHit& theirs = results[1][i];
@@ -532,8 +546,9 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
             }
             same = same && ours.candidates == theirs.candidates;
             differ += same ? 0 : 1;
+            if (!same && differ <= 5) detail += describe(i, ours) + describe(i, theirs);
         }
-        EXPECT_LE(differ, rays.size() / 1000);
+        EXPECT_LE(differ, rays.size() / 1000) << detail;
         EXPECT_EQ(met > 100, each.mask != 0) << met;
     }
 }

@@ -9,10 +9,12 @@
 
 #include <fmt/format.h>
 
-#include <chrono>
+#include <algorithm>
+#include <atomic>
 #include <cstring>
 #include <memory>
 #include <stdexcept>
+#include <thread>
 #include <type_traits>
 
 namespace glint::test {
@@ -35,54 +37,77 @@ void copyIn(RTCGeometry geometry, RTCBufferType type, RTCFormat format, const st
     std::memcpy(place, values.data(), values.size() * sizeof(T));
 }
 
+RayHit closestHit(RTCScene scene, const Ray& ray) {
+    RTCRayHit query = {};
+    query.ray.org_x = ray.origin.x;
+    query.ray.org_y = ray.origin.y;
+    query.ray.org_z = ray.origin.z;
+    query.ray.tnear = ray.t_min;
+    query.ray.dir_x = ray.direction.x;
+    query.ray.dir_y = ray.direction.y;
+    query.ray.dir_z = ray.direction.z;
+    query.ray.tfar = ray.t_max;
+    query.ray.mask = 0xffffffff;
+    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+#if RTC_VERSION_MAJOR >= 4
+    rtcIntersect1(scene, &query);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcIntersect1(scene, &context, &query);
+#endif
+    RayHit hit;
+    if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
+        const RTCHit& found = query.hit;
+        // Its normal follows from the corners as ours does, so it looks towards the origin of a ray from in front.
+        const float facing = found.Ng_x * ray.direction.x + found.Ng_y * ray.direction.y + found.Ng_z * ray.direction.z;
+        hit = {query.ray.tfar, found.primID, 0, found.u, found.v, facing < 0.0f ? 1u : 0u};
+    }
+    return hit;
+}
+
 }  // namespace
 
-std::vector<RayHit> castWithEmbree(const Mesh& mesh, std::span<const Ray> rays, EmbreeMode mode, double* seconds) {
-    const Holder<RTCDevice> device(rtcNewDevice("threads=1"));
-    const Holder<RTCScene> scene(rtcNewScene(device.get()));
-    rtcSetSceneFlags(scene.get(), mode == EmbreeMode::Robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-    const Holder<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+struct EmbreeScene::Handles {
+    Holder<RTCDevice> device;
+    Holder<RTCScene> scene;
+};
+
+EmbreeScene::EmbreeScene(const Mesh& mesh, EmbreeMode mode) : handles_(std::make_unique<Handles>()) {
+    handles_->device.reset(rtcNewDevice(nullptr));
+    handles_->scene.reset(rtcNewScene(handles_->device.get()));
+    RTCScene scene = handles_->scene.get();
+    rtcSetSceneFlags(scene, mode == EmbreeMode::Robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
+    const Holder<RTCGeometry> geometry(rtcNewGeometry(handles_->device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
     copyIn(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh.positions, sizeof(Vector3f));
     copyIn(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.indices, 3 * sizeof(uint32_t));
     rtcCommitGeometry(geometry.get());
-    rtcAttachGeometry(scene.get(), geometry.get());
-    rtcCommitScene(scene.get());
+    rtcAttachGeometry(scene, geometry.get());
+    rtcCommitScene(scene);
+}
 
-    std::vector<RayHit> hits;
-    hits.reserve(rays.size());
-    const auto begin = std::chrono::steady_clock::now();
-    for (const Ray& ray : rays) {
-        RTCRayHit query = {};
-        query.ray.org_x = ray.origin.x;
-        query.ray.org_y = ray.origin.y;
-        query.ray.org_z = ray.origin.z;
-        query.ray.tnear = ray.t_min;
-        query.ray.dir_x = ray.direction.x;
-        query.ray.dir_y = ray.direction.y;
-        query.ray.dir_z = ray.direction.z;
-        query.ray.tfar = ray.t_max;
-        query.ray.mask = 0xffffffff;
-        query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-        query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-#if RTC_VERSION_MAJOR >= 4
-        rtcIntersect1(scene.get(), &query);
-#else
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        rtcIntersect1(scene.get(), &context, &query);
-#endif
-        RayHit hit;
-        if (query.hit.geomID != RTC_INVALID_GEOMETRY_ID) {
-            const RTCHit& found = query.hit;
-            // Its normal follows from the corners as ours does, so it looks towards the origin of a ray from in front.
-            const float facing =
-                found.Ng_x * ray.direction.x + found.Ng_y * ray.direction.y + found.Ng_z * ray.direction.z;
-            hit = {query.ray.tfar, found.primID, 0, found.u, found.v, facing < 0.0f ? 1u : 0u};
-        }
-        hits.push_back(hit);
-    }
-    if (seconds) *seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+EmbreeScene::~EmbreeScene() = default;
+
+std::vector<RayHit> EmbreeScene::cast(std::span<const Ray> rays) const {
+    std::vector<RayHit> hits(rays.size());
+    cast(rays, hits);
     return hits;
+}
+
+void EmbreeScene::cast(std::span<const Ray> rays, std::span<RayHit> hits, uint32_t threads) const {
+    constexpr size_t chunk = 4096;
+    std::atomic<size_t> next = 0;
+    const auto work = [&] {
+        for (size_t begin = next.fetch_add(chunk); begin < rays.size(); begin = next.fetch_add(chunk))
+            for (size_t i = begin; i < std::min(rays.size(), begin + chunk); i++)
+                hits[i] = closestHit(handles_->scene.get(), rays[i]);
+    };
+    std::vector<std::thread> others;
+    for (uint32_t i = 1; i < threads; i++) others.emplace_back(work);
+    work();
+    for (std::thread& other : others) other.join();
 }
 
 std::string embreeName() { return fmt::format("Embree {}", RTC_VERSION_STRING); }

@@ -4,6 +4,7 @@
 
 #include <glint/graphics/ray_caster.h>
 
+#include <memory>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,10 +14,24 @@ namespace glint::test {
 /// Whether Embree's watertight triangle test (RTC_SCENE_FLAG_ROBUST) or its faster default is used.
 enum class EmbreeMode : bool { Fast, Robust };
 
-/// The closest hits of rays, one at a time. Primitives count as in the mesh, the geometry is 0. Triangles and rays have
-/// to be finite. `seconds` gets the time of the casting alone, by one thread.
-std::vector<RayHit> castWithEmbree(const Mesh& mesh, std::span<const Ray> rays, EmbreeMode mode,
-                                   double* seconds = nullptr);
+/// A mesh in Embree, of its medium build quality.
+class EmbreeScene {
+public:
+    /// Throws std::runtime_error if Embree has no memory.
+    EmbreeScene(const Mesh& mesh, EmbreeMode mode);
+    ~EmbreeScene();
+    EmbreeScene(const EmbreeScene&) = delete;
+    EmbreeScene& operator=(const EmbreeScene&) = delete;
+
+    /// The closest hits of rays, one ray at a time (rtcIntersect1), by this thread and others. Primitives count as in
+    /// the mesh, the geometry is 0. Triangles and rays have to be finite.
+    void cast(std::span<const Ray> rays, std::span<RayHit> hits, uint32_t threads = 1) const;
+    std::vector<RayHit> cast(std::span<const Ray> rays) const;
+
+private:
+    struct Handles;
+    std::unique_ptr<Handles> handles_;
+};
 
 /// "Embree 3.13.5".
 std::string embreeName();

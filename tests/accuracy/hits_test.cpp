@@ -80,7 +80,7 @@ TEST_F(HitAccuracy, Bunny) {
     EXPECT_LE(HitComparison::quantile(result.t_errors, 0.9999), 1e-6);
 
     const HitComparison embree =
-        compareHits(ReferenceHierarchy(*mesh), rays, castWithEmbree(*mesh, rays, EmbreeMode::Robust));
+        compareHits(ReferenceHierarchy(*mesh), rays, EmbreeScene(*mesh, EmbreeMode::Robust).cast(rays));
     EXPECT_EQ(embree.wrong, 0u) << embree.first;
 }
 
@@ -217,7 +217,7 @@ TEST_F(HitAccuracy, EmbreeIsNoLessExactInItsRobustMode) {
     const Mesh mesh = createTorus(1.0f, 0.4f, 64, 32);
     const std::vector<Ray> rays = raysAround(mesh, 20000);
     const HitComparison result =
-        compareHits(ReferenceHierarchy(mesh), rays, castWithEmbree(mesh, rays, EmbreeMode::Robust));
+        compareHits(ReferenceHierarchy(mesh), rays, EmbreeScene(mesh, EmbreeMode::Robust).cast(rays));
     EXPECT_EQ(result.wrong, 0u) << result.first;
     EXPECT_GT(result.hits, rays.size() / 4);
 }

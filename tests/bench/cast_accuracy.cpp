@@ -35,7 +35,11 @@ struct Tracer {
 std::vector<Tracer> tracers(const Device& device) {
     const auto embree = [](EmbreeMode mode) {
         return [mode](const Mesh& mesh, std::span<const Ray> rays, double& seconds) {
-            return test::castWithEmbree(mesh, rays, mode, &seconds);
+            const test::EmbreeScene scene(mesh, mode);
+            const double begin = wallSeconds();
+            std::vector<RayHit> hits = scene.cast(rays);
+            seconds = wallSeconds() - begin;
+            return hits;
         };
     };
     return {

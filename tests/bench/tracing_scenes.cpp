@@ -1,5 +1,6 @@
 #include "bench/tracing_scenes.h"
 
+#include "accuracy/embree.h"
 #include "support/reference.h"
 
 #include <glint/geometry/primitives.h>
@@ -69,7 +70,7 @@ std::vector<Ray> cameraRays() {
 
 std::vector<Ray> bounceRays(const Mesh& mesh, std::span<const Ray> rays) {
     std::vector<RayHit> hits(rays.size());
-    EmbreeScene(mesh, true).trace(rays, hits);
+    test::EmbreeScene(mesh, test::EmbreeMode::Robust).cast(rays, hits, 2);
     test::Random random(1);
     std::vector<Ray> result(rays.size());
     for (size_t i = 0; i < rays.size(); i++) {
@@ -86,63 +87,6 @@ std::vector<Ray> bounceRays(const Mesh& mesh, std::span<const Ray> rays) {
 }
 
 }  // namespace
-
-EmbreeScene::EmbreeScene(const Mesh& mesh, bool robust) : device_(rtcNewDevice("threads=2")) {
-    scene_ = rtcNewScene(device_);
-    if (robust) rtcSetSceneFlags(scene_, RTC_SCENE_FLAG_ROBUST);
-    rtcSetSceneBuildQuality(scene_, RTC_BUILD_QUALITY_MEDIUM);
-    RTCGeometry geometry = rtcNewGeometry(device_, RTC_GEOMETRY_TYPE_TRIANGLE);
-    void* vertices =
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 12, mesh.positions.size());
-    void* indices =
-        rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 12, mesh.triangleCount());
-    std::memcpy(vertices, mesh.positions.data(), 12 * mesh.positions.size());
-    std::memcpy(indices, mesh.indices.data(), 4 * mesh.indices.size());
-    rtcCommitGeometry(geometry);
-    rtcAttachGeometry(scene_, geometry);
-    rtcReleaseGeometry(geometry);
-    rtcCommitScene(scene_);
-}
-
-EmbreeScene::~EmbreeScene() {
-    rtcReleaseScene(scene_);
-    rtcReleaseDevice(device_);
-}
-
-void EmbreeScene::trace(std::span<const Ray> rays, std::span<RayHit> hits) const {
-    constexpr size_t chunk = 4096;
-    std::atomic<size_t> next = 0;
-    const auto work = [&] {
-        RTCIntersectContext context;
-        rtcInitIntersectContext(&context);
-        for (size_t begin = next.fetch_add(chunk); begin < rays.size(); begin = next.fetch_add(chunk)) {
-            for (size_t i = begin; i < std::min(rays.size(), begin + chunk); i++) {
-                RTCRayHit query;
-                query.ray = {rays[i].origin.x,
-                             rays[i].origin.y,
-                             rays[i].origin.z,
-                             rays[i].t_min,
-                             rays[i].direction.x,
-                             rays[i].direction.y,
-                             rays[i].direction.z,
-                             0.0f,
-                             rays[i].t_max,
-                             0xffffffffu,
-                             0,
-                             0};
-                query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-                query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-                rtcIntersect1(scene_, &context, &query);
-                const bool hit = query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
-                hits[i] = {};
-                if (hit) hits[i] = {query.ray.tfar, query.hit.primID, 0, query.hit.u, query.hit.v, 0};
-            }
-        }
-    };
-    std::thread other(work);
-    work();
-    other.join();
-}
 
 TracingScene makeTracingScene(const std::string& name) {
     TracingScene scene;

@@ -1,33 +1,16 @@
 #pragma once
 
-// Meshes and rays for the benchmarks of tracing, and Embree's answers.
+// Meshes and rays for the benchmarks of tracing.
 
 #include "bench/bench.h"
 
 #include <glint/format/mesh.h>
 #include <glint/graphics/ray_caster.h>
 
-#include <embree3/rtcore.h>
-
-#include <memory>
+#include <string>
+#include <vector>
 
 namespace glint::bench {
-
-/// A scene of Embree's: medium build quality.
-class EmbreeScene {
-public:
-    EmbreeScene(const Mesh& mesh, bool robust);
-    ~EmbreeScene();
-    EmbreeScene(const EmbreeScene&) = delete;
-    EmbreeScene& operator=(const EmbreeScene&) = delete;
-
-    /// One ray at a time (rtcIntersect1) on two threads. RayHit::geometry is 0.
-    void trace(std::span<const Ray> rays, std::span<RayHit> hits) const;
-
-private:
-    RTCDevice device_ = nullptr;
-    RTCScene scene_ = nullptr;
-};
 
 struct TracingScene {
     std::string name;

@@ -2,6 +2,7 @@
 // Embree's rtcIntersect1 on two threads, in turns in one run. tracing.build.{quality,fast,refit}: millions of triangles
 // a second of the builders, on the 1m mesh. tracing.leaks.software: rays at edges that slip through.
 
+#include "accuracy/embree.h"
 #include "bench/tracing_scenes.h"
 
 #include "support/reference.h"
@@ -154,13 +155,13 @@ std::vector<RaceTimes> race(const Device& device, const Buffer& hierarchy, const
         batches.push_back(std::make_unique<Batch>(device, kernels.back(), hierarchy, rays));
     }
     std::vector<RayHit> reference(rays.size());
-    EmbreeScene(scene.mesh, true).trace(rays, reference);
-    const EmbreeScene embree(scene.mesh, false);
+    test::EmbreeScene(scene.mesh, test::EmbreeMode::Robust).cast(rays, reference, 2);
+    const test::EmbreeScene embree(scene.mesh, test::EmbreeMode::Fast);
     std::vector<RayHit> hits(rays.size());
     std::vector<RaceTimes> times(variants.size() + 1);
     for (uint32_t turn = 0; turn <= turns; turn++) {
         // The driver compiles at the first dispatch, which does not count.
-        times[0].take([&] { embree.trace(rays, hits); }, turn > 0);
+        times[0].take([&] { embree.cast(rays, hits, 2); }, turn > 0);
         for (size_t i = 0; i < variants.size(); i++) {
             const auto count = static_cast<uint32_t>(rays.size());
             const uint32_t threads = (count + variants[i].rays_per_thread - 1) / variants[i].rays_per_thread;
@@ -230,8 +231,8 @@ void runLeaks(Report& report) {
     uint64_t leaks = 0;
     uint64_t embree_leaks = 0;
     uint64_t robust_leaks = 0;
-    const EmbreeScene embree(mesh, false);
-    const EmbreeScene robust(mesh, true);
+    const test::EmbreeScene embree(mesh, test::EmbreeMode::Fast);
+    const test::EmbreeScene robust(mesh, test::EmbreeMode::Robust);
     const auto count = [](std::span<const RayHit> hits) {
         return static_cast<uint64_t>(
             std::count_if(hits.begin(), hits.end(), [](const RayHit& hit) { return !hit.isHit() || hit.t > 1.01f; }));
@@ -243,9 +244,9 @@ void runLeaks(Report& report) {
         leaks += count(batch.hits());
         if (i != 0) continue;
         std::vector<RayHit> hits(rays.size());
-        embree.trace(rays, hits);
+        embree.cast(rays, hits, 2);
         embree_leaks = count(hits);
-        robust.trace(rays, hits);
+        robust.cast(rays, hits, 2);
         robust_leaks = count(hits);
     }
     fmt::print("  {} of {} million rays; Embree {}, robust {} of the first million\n", leaks, batches, embree_leaks,

@@ -130,13 +130,10 @@ public:
         const auto count = static_cast<uint32_t>(tree_.refs.size());
         tree_.nodes = Array<BinaryNode>(count - 1);
         tree_.heights = Array<uint8_t>(count - 1);
-        tree_.build_bytes = count * (sizeof(PrimRef) + sizeof(BinaryNode) + 1);
+        tree_.costs = Array<CollapseCost>(count - 1);
+        tree_.build_bytes = count * (sizeof(PrimRef) + sizeof(BinaryNode) + sizeof(CollapseCost) + 1);
         Range all = {0, count, 0, {}};
-        if (mode_ == BuildMode::Quality) {
-            tree_.costs = Array<CollapseCost>(count - 1);
-            tree_.build_bytes += count * sizeof(CollapseCost);
-            all.centers = centers(all);
-        }
+        if (mode_ == BuildMode::Quality) { all.centers = centers(all); }
         // The top is split with all threads at each node, then each thread takes subtrees.
         task_size_ = std::max<uint32_t>(grain, count / 64);
         if (mode_ == BuildMode::Quality && count > task_size_) {
@@ -207,13 +204,10 @@ private:
         node.left = left;
         node.right = right;
         tree_.heights[index] = static_cast<uint8_t>(1 + std::max(tree_.height(left), tree_.height(right)));
-        if (mode_ == BuildMode::Quality) {
-            float* costs = tree_.costs[index].costs;
-            const float area = halfArea(box, tree_.area_scale);
-            costs[0] = distribute(tree_, node, CollapseCost::count + 1).cost + area;
-            for (uint32_t i = 2; i <= CollapseCost::count; i++)
-                costs[i - 1] = std::min(costs[i - 2], distribute(tree_, node, i).cost);
-        }
+        float* costs = tree_.costs[index].costs;
+        costs[0] = distribute(tree_, node, CollapseCost::count + 1).cost + halfArea(box, tree_.area_scale);
+        for (uint32_t i = 2; i <= CollapseCost::count; i++)
+            costs[i - 1] = std::min(costs[i - 2], distribute(tree_, node, i).cost);
     }
 
     Box4 centers(const Range& range) {

@@ -41,10 +41,7 @@ public:
     /// Writes the node of an item into `node`, and appends room for its children to the run. Returns them.
     Children open(const Item& item, Node& node, Run& run) const {
         Children children;
-        if (tree_.costs.size() != 0)
-            collect(item, node_width, children);
-        else
-            openLargest(item, children);
+        collect(item, node_width, children);
         // So many levels are enough for a subtree as high as that, if the highest children are opened first; when the
         // others would leave too few, that is done. See docs/tracing.md, "Depth".
         uint32_t height = 0;
@@ -118,35 +115,20 @@ private:
         }
     }
 
-    template <class Better>
-    void openBy(const Item& item, Children& children, const Better& rank) const {
-        float ranks[node_width];
-        const auto put = [&](uint32_t s, const Item& child) {
-            children.items[s] = child;
-            ranks[s] = child.child.isLeaf() ? -1.0f : rank(child);
-        };
-        if (item.child.isLeaf()) {
-            children.items[children.count++] = item;
-            return;
-        }
-        put(0, leftOf(item));
-        put(1, rightOf(item));
+    void openHighest(const Item& item, Children& children) const {
+        children.items[0] = leftOf(item);
+        children.items[1] = rightOf(item);
         children.count = 2;
         while (children.count < node_width) {
-            uint32_t best = 0;
-            for (uint32_t s = 1; s < children.count; s++) best = ranks[s] > ranks[best] ? s : best;
-            if (ranks[best] < 0.0f) return;
-            const Item opened = children.items[best];
-            put(best, leftOf(opened));
-            put(children.count++, rightOf(opened));
+            Item* highest = children.items;
+            for (uint32_t s = 1; s < children.count; s++) {
+                if (heightOf(children.items[s]) > heightOf(*highest)) highest = &children.items[s];
+            }
+            if (highest->child.isLeaf()) return;
+            const Item opened = *highest;
+            *highest = leftOf(opened);
+            children.items[children.count++] = rightOf(opened);
         }
-    }
-
-    void openLargest(const Item& item, Children& children) const {
-        openBy(item, children, [&](const Item& child) { return halfArea(nodeOf(child).box(), tree_.area_scale); });
-    }
-    void openHighest(const Item& item, Children& children) const {
-        openBy(item, children, [&](const Item& child) { return static_cast<float>(heightOf(child)); });
     }
 
     const BinaryTree& tree_;

@@ -60,8 +60,8 @@ struct BinaryTree {
 
     Array<PrimRef> refs;
     Array<BinaryNode> nodes;
-    Array<uint8_t> heights;                 ///< of each node: 1 if both children are leaves
-    Array<CollapseCost> costs;              ///< with BuildMode::Quality
+    Array<uint8_t> heights;  ///< of each node: 1 if both children are leaves
+    Array<CollapseCost> costs;
     BinaryChild root;                       ///< of one primitive at least
     Float4 area_scale = Float4::all(1.0f);  ///< for halfArea
     uint64_t build_bytes = 0;

@@ -16,7 +16,7 @@ struct WideTree {
     uint32_t depth = 0;
 };
 
-/// With costs: the cheapest nodes; without: those that open the largest child first. No deeper than max_depth.
+/// The cheapest nodes, by their surfaces; no deeper than max_depth.
 WideTree collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool);
 
 }  // namespace glint::detail

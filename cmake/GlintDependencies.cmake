@@ -34,6 +34,12 @@ add_library(glint_xxhash INTERFACE)
 target_include_directories(glint_xxhash SYSTEM INTERFACE "${GLINT_XXHASH_INCLUDE_DIR}")
 target_link_libraries(glint_xxhash INTERFACE xxhash)  # by name: its path here is nobody else's
 
+find_path(GLINT_TURBOJPEG_INCLUDE_DIR turbojpeg.h REQUIRED)
+find_library(GLINT_TURBOJPEG_LIBRARY turbojpeg REQUIRED)
+add_library(glint_turbojpeg INTERFACE)
+target_include_directories(glint_turbojpeg SYSTEM INTERFACE "${GLINT_TURBOJPEG_INCLUDE_DIR}")
+target_link_libraries(glint_turbojpeg INTERFACE turbojpeg)
+
 find_path(GLINT_STB_INCLUDE_DIR stb/stb_image.h REQUIRED)
 add_library(glint_stb INTERFACE)
 target_include_directories(glint_stb SYSTEM INTERFACE "${GLINT_STB_INCLUDE_DIR}")

@@ -80,9 +80,10 @@ private:
 /// Errors: "image.png_malformed", "image.too_large".
 Expected<Image> decodePng(std::span<const std::byte> bytes, uint64_t limit = Image::default_limit);
 
-/// Reads a JPEG file's bytes with stb_image, baseline or progressive: FormatRu8n for one channel, RGBAu8n for more.
-/// Values are those stored: no colour profile is applied, and no orientation of the camera. The image may take `limit`
-/// bytes, and the reader four times as much beside it. Errors: "image.jpeg_malformed", "image.too_large".
+/// Reads a JPEG file's bytes with libjpeg-turbo, baseline or progressive: FormatRu8n for one channel, RGBAu8n for
+/// three. Values are those stored: no colour profile is applied, and no orientation of the camera. A file that ends
+/// early is a picture with gray in it. The image may take `limit` bytes, and the reader four times as much beside it.
+/// Errors: "image.jpeg_malformed", "image.too_large".
 Expected<Image> decodeJpeg(std::span<const std::byte> bytes, uint64_t limit = Image::default_limit);
 
 /// Makes a PNG file's bytes. For FormatRu8n, RGu8n, RGBAu8n, RGBAu8ns, BGRAu8n, BGRAu8ns, Ru16n, RGu16n and RGBAu16n;

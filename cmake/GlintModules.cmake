@@ -29,7 +29,7 @@ function(glint_embed_shaders name folder)
     endif()
     set(source "${PROJECT_BINARY_DIR}/embedded_shaders.cpp")
     set(script "${PROJECT_SOURCE_DIR}/cmake/embed_shaders.cmake")
-    file(GLOB_RECURSE files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*")
+    file(GLOB_RECURSE files CONFIGURE_DEPENDS "${PROJECT_SOURCE_DIR}/${folder}/*.h")
     # A removed file must lead to a new table too: the list of files is a dependency of its own.
     set(list "${PROJECT_BINARY_DIR}/embedded_shaders.txt")
     file(GENERATE OUTPUT "${list}" CONTENT "$<JOIN:${files},\n>\n")

@@ -7,6 +7,7 @@
 #include <glint/device/texture.h>
 #include <glint/device/tracing.h>
 
+#include <concepts>
 #include <cstdint>
 #include <initializer_list>
 #include <memory>
@@ -25,14 +26,17 @@ struct RecorderDeleter {
 using RecorderPtr = std::unique_ptr<RecorderCore, RecorderDeleter>;
 }  // namespace detail
 
+/// What may be copied byte by byte.
+template <class T>
+concept TriviallyCopyable = std::is_trivially_copyable_v<T>;
+
 /// Names a resource of the current program: the i-th of its kind in (set, binding) order, or by the shader's own name,
 /// or by set and binding. Remembers the line of the call for messages.
 class Slot {
 public:
     using Where = std::source_location;
 
-    template <class Integer>
-        requires std::is_integral_v<Integer>
+    template <std::integral Integer>
     Slot(Integer index, Where where = Where::current()) : index_(static_cast<int64_t>(index)), where_(where) {}
     Slot(const char* name, Where where = Where::current()) : name_(name), where_(where) {}
     static Slot at(uint32_t set, uint32_t binding, Where where = Where::current()) {
@@ -77,8 +81,7 @@ public:
 
     /// Uploads `data` inline as uniform block of the slot. Its size must be that of the block, rounded up to 16 bytes
     /// or not ("bind.uniform_size").
-    template <class T>
-        requires std::is_trivially_copyable_v<T>
+    template <TriviallyCopyable T>
     void setUniform(Slot slot, const T& data) {
         setUniformData(slot, &data, sizeof(T));
     }
@@ -100,8 +103,7 @@ public:
     void setTexelBuffer(Slot slot, const Buffer& buffer, Format format, uint64_t offset = 0, uint64_t size = 0);
 
     /// Push constants of the current program, from its first byte on ("bind.push_size").
-    template <class T>
-        requires std::is_trivially_copyable_v<T>
+    template <TriviallyCopyable T>
     void setPushConstants(const T& data, Where where = Where::current()) {
         setPushData(&data, sizeof(T), where);
     }

@@ -13,33 +13,11 @@
 #pragma once
 
 #include <glint/tracing/memory.h>
+#include <glint/tracing/ray_query.h>
 #include <glint/tracing/traversal.h>
 
-#ifndef GLINT_TRACING_QUERIES
-#define GLINT_TRACING_QUERIES 1
-#endif
-
-// Flags of rays and instances, kinds of hierarchies: the numbers of Vulkan, and of core/tracing/detail/hierarchy.h.
-const uint GLINT_RAY_OPAQUE = 1u;
-const uint GLINT_RAY_NO_OPAQUE = 2u;
-const uint GLINT_RAY_TERMINATE = 4u;
-const uint GLINT_RAY_CULL_BACK = 16u;
-const uint GLINT_RAY_CULL_FRONT = 32u;
-const uint GLINT_RAY_CULL_OPAQUE = 64u;
-const uint GLINT_RAY_CULL_NO_OPAQUE = 128u;
-const uint GLINT_RAY_SKIP_TRIANGLES = 256u;
-const uint GLINT_RAY_SKIP_BOXES = 512u;
-const uint GLINT_INSTANCE_CULL_DISABLE = 1u;
-const uint GLINT_INSTANCE_FLIP_FACING = 2u;
-const uint GLINT_INSTANCE_OPAQUE = 4u;
-const uint GLINT_INSTANCE_NO_OPAQUE = 8u;
+// Of a hierarchy, as in core/tracing/detail/hierarchy.h.
 const uint GLINT_KIND_BOXES = 1u;
-
-const uint GLINT_CANDIDATE_TRIANGLE = 0u;
-const uint GLINT_CANDIDATE_BOX = 1u;
-const uint GLINT_COMMITTED_NONE = 0u;
-const uint GLINT_COMMITTED_TRIANGLE = 1u;
-const uint GLINT_COMMITTED_GENERATED = 2u;
 
 // Both levels' lists.
 #define GLINT_QUERY_STACK (2 * GLINT_TRACING_STACK + 1)

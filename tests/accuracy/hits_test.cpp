@@ -20,7 +20,7 @@ class HitAccuracy : public DeviceTest {
 protected:
     void SetUp() override {
         DeviceTest::SetUp();
-        if (device && !device.getFeatures().computeTracing) GTEST_SKIP() << "the adapter has no ray queries";
+        GLINT_NEED_FEATURE(FeatureComputeTracing);
     }
 
     std::vector<RayHit> cast(const Mesh& mesh, const std::vector<Ray>& rays) {
@@ -72,7 +72,7 @@ std::vector<Ray> raysDown(uint32_t count, float from) {
 }  // namespace
 
 TEST_F(HitAccuracy, Bunny) {
-    if (bunnyPath().empty()) GTEST_SKIP() << "needs the Stanford bunny of Debian's package glmark2-data";
+    GLINT_NEED_BUNNY();
     const Expected<Mesh> mesh = Mesh::load(bunnyPath());
     ASSERT_THAT(mesh, IsOk());
     const std::vector<Ray> rays = raysAround(*mesh, 20000);

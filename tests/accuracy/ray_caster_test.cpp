@@ -22,7 +22,7 @@ class RayCasterTest : public DeviceTest {
 protected:
     void SetUp() override {
         DeviceTest::SetUp();
-        if (device && !device.getFeatures().computeTracing) GTEST_SKIP() << "the adapter has no ray queries";
+        GLINT_NEED_FEATURE(FeatureComputeTracing);
     }
 
     std::vector<RayHit> cast(const Mesh& mesh, const std::vector<Ray>& rays) {

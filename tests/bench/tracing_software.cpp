@@ -4,7 +4,7 @@
 
 #include "accuracy/embree.h"
 #include "bench/tracing_scenes.h"
-
+#include "support/hierarchies.h"
 #include "support/reference.h"
 
 #include <glint/geometry/primitives.h>
@@ -24,21 +24,6 @@ using detail::BuildMode;
 using detail::Hierarchy;
 
 constexpr uint32_t rounds = 9;
-
-detail::TriangleGeometry geometryOf(const Mesh& mesh) {
-    detail::TriangleGeometry geometry;
-    geometry.positions = reinterpret_cast<const std::byte*>(mesh.positions.data());
-    geometry.vertices = static_cast<uint32_t>(mesh.positions.size());
-    geometry.indices = reinterpret_cast<const std::byte*>(mesh.indices.data());
-    geometry.index = detail::TriangleGeometry::Index::Uint32;
-    geometry.triangles = static_cast<uint32_t>(mesh.triangleCount());
-    return geometry;
-}
-
-Hierarchy build(const Mesh& mesh, BuildMode mode, ThreadPool* pool) {
-    const detail::TriangleGeometry geometry = geometryOf(mesh);
-    return std::move(*check(detail::buildHierarchy(std::span(&geometry, 1), mode, pool)));
-}
 
 /// As the kernel writes it.
 struct BatchHit {
@@ -189,7 +174,7 @@ void runTracing(Report& report) {
                                 {"refilling", "GLINT_TRACING_REFILL=1;GLINT_TRACING_RAYS=16", 16}};
     for (const char* name : {"bunny", "100k", "1m"}) {
         const TracingScene scene = makeTracingScene(name);
-        const Hierarchy hierarchy = build(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
+        const Hierarchy hierarchy = test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
         Device owner = device;
         const Buffer buffer = owner.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
         const auto camera = race(device, buffer, scene, "camera", scene.camera, variants, rounds);
@@ -224,7 +209,7 @@ void runLeaks(Report& report) {
     constexpr uint32_t batches = 16;
     const Device device = createDevice();
     const Mesh mesh = createTorus(1.0f, 0.4f, 100, 50);
-    const Hierarchy hierarchy = build(mesh, BuildMode::Quality, &ThreadPool::shared());
+    const Hierarchy hierarchy = test::hierarchyOf(mesh, BuildMode::Quality, &ThreadPool::shared());
     Device owner = device;
     const Buffer buffer = owner.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
     const Kernel kernel = createKernel(device, {"coherent", ""});
@@ -258,7 +243,7 @@ void runLeaks(Report& report) {
 
 void runBuilds(Report& report) {
     const TracingScene scene = makeTracingScene("1m");
-    const detail::TriangleGeometry geometry = geometryOf(scene.mesh);
+    const detail::TriangleGeometry geometry = test::geometryOf(scene.mesh);
     const double million = static_cast<double>(geometry.triangles) * 1e-6;
     ThreadPool& pool = ThreadPool::shared();
     Times quality;
@@ -266,10 +251,10 @@ void runBuilds(Report& report) {
     Times refit;
     for (uint32_t round = 0; round < 5; round++) {
         double begin = wallSeconds();
-        const Hierarchy slow = build(scene.mesh, BuildMode::Quality, &pool);
+        const Hierarchy slow = test::hierarchyOf(scene.mesh, BuildMode::Quality, &pool);
         quality.values.push_back(wallSeconds() - begin);
         begin = wallSeconds();
-        Hierarchy quick = build(scene.mesh, BuildMode::Fast, &pool);
+        Hierarchy quick = test::hierarchyOf(scene.mesh, BuildMode::Fast, &pool);
         fast.values.push_back(wallSeconds() - begin);
         begin = wallSeconds();
         check(detail::refitHierarchy(quick, std::span(&geometry, 1), &pool));

@@ -151,7 +151,7 @@ TEST_F(BufferShaderTest, MappedMemoryGoesBothWays) {
 }
 
 TEST_P(BufferTest, AddressesDifferAndAreStable) {
-    if (!device.getFeatures().bufferAddress) GTEST_SKIP() << "the adapter has no buffer addresses";
+    GLINT_NEED_FEATURE(FeatureBufferAddress);
     const Buffer a = device.createBuffer(Buffer::FlagAddress, 256);
     const Buffer b = device.createBuffer(Buffer::FlagAddress, 256);
     EXPECT_NE(a.getAddress(), 0u);

@@ -458,7 +458,7 @@ TEST_F(ComputeTest, UntrackedWithBarriers) {
 }
 
 TEST_F(ComputeTest, BuffersByAddress) {
-    if (!device.getFeatures().bufferAddress) GTEST_SKIP() << "the adapter has no buffer addresses";
+    GLINT_NEED_FEATURE(FeatureBufferAddress);
     const Kernel kernel = makeKernel(R"(
         layout(local_size_x = 8) in;
         layout(buffer_reference, std430, buffer_reference_align = 4) buffer Values { uint values[]; };
@@ -530,7 +530,7 @@ TEST_F(ComputeTest, EveryQueue) {
 }
 
 TEST_F(ComputeTest, AtomicsOn64Bits) {
-    if (!device.getFeatures().atomicBufferu64) GTEST_SKIP() << "the adapter has no 64-bit atomics";
+    GLINT_NEED_FEATURE(FeatureAtomicBufferu64);
     const Buffer buffer = makeBuffer(std::vector<uint64_t>{1});
     compute([&](Compute& list) {
         list.setKernel(makeKernel(R"(
@@ -544,7 +544,7 @@ TEST_F(ComputeTest, AtomicsOn64Bits) {
 }
 
 TEST_F(ComputeTest, Doubles) {
-    if (!device.getFeatures().shaderf64) GTEST_SKIP() << "the adapter has no doubles";
+    GLINT_NEED_FEATURE(FeatureShaderf64);
     const Buffer buffer = makeBuffer(std::vector<double>{1e300});
     compute([&](Compute& list) {
         list.setKernel(makeKernel(R"(

@@ -15,6 +15,16 @@ namespace {
 using Attribute = Pipeline::VertexAttribute;
 using Bytes = std::vector<std::byte>;
 
+/// Takes over what a model hands out, and says where it begins among the rest.
+MeshModel::BufferCallback appendTo(Bytes& bytes, uint64_t& offset) {
+    return [&](const void* src, size_t size) {
+        offset = bytes.size();
+        const auto* begin = static_cast<const std::byte*>(src);
+        bytes.insert(bytes.end(), begin, begin + size);
+        return true;
+    };
+}
+
 /// A model whose bytes are kept here instead of in buffers.
 struct Captured {
     MeshModel model;
@@ -372,16 +382,8 @@ TEST_F(MeshModelGpuTest, DrawsFromMergedBuffers) {
         textured[i] = meshes[i];
         if (textured[i].texcoords.empty())
             textured[i].texcoords.assign(textured[i].positions.size(), Vector2f(0.25f, 0.75f));
-        const auto append = [](Bytes& bytes, uint64_t& offset) {
-            return [&](const void* src, size_t size) {
-                offset = bytes.size();
-                const auto* begin = static_cast<const std::byte*>(src);
-                bytes.insert(bytes.end(), begin, begin + size);
-                return true;
-            };
-        };
-        merged[i].setVertexBufferCallback(append(vertices, vertex_offsets[i]));
-        merged[i].setIndexBufferCallback(append(indices, index_offsets[i]));
+        merged[i].setVertexBufferCallback(appendTo(vertices, vertex_offsets[i]));
+        merged[i].setIndexBufferCallback(appendTo(indices, index_offsets[i]));
         ASSERT_THAT(
             merged[i].create(device, pipeline, textured[i], i == 1 ? MeshModel::FlagIndices32 : MeshModel::FlagNone),
             IsOk());
@@ -407,22 +409,14 @@ TEST_F(MeshModelGpuTest, DrawsFromMergedBuffers) {
 // Rays down through two models in merged buffers, each with two geometries: every ray meets what the float64 reference
 // says, and the shader finds the corner of the triangle that was hit through base vertex and first index.
 TEST_F(MeshModelGpuTest, TracesFromMergedBuffers) {
-    if (!device.getFeatures().computeTracing) GTEST_SKIP() << "the adapter has no ray queries";
+    GLINT_NEED_FEATURE(FeatureComputeTracing);
     const Mesh mesh = twoParts();
     MeshModel models[2];
     Bytes vertices, indices;
     uint64_t offsets[2][2];
     for (int i = 0; i < 2; i++) {
-        const auto append = [](Bytes& bytes, uint64_t& offset) {
-            return [&](const void* src, size_t size) {
-                offset = bytes.size();
-                const auto* begin = static_cast<const std::byte*>(src);
-                bytes.insert(bytes.end(), begin, begin + size);
-                return true;
-            };
-        };
-        models[i].setVertexBufferCallback(append(vertices, offsets[i][0]));
-        models[i].setIndexBufferCallback(append(indices, offsets[i][1]));
+        models[i].setVertexBufferCallback(appendTo(vertices, offsets[i][0]));
+        models[i].setIndexBufferCallback(appendTo(indices, offsets[i][1]));
         ASSERT_THAT(models[i].create(device, interleaved, mesh, MeshModel::FlagIndices32), IsOk());
     }
     const Buffer::Flags flags = Buffer::FlagTracing | Buffer::FlagStorage;

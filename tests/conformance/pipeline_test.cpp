@@ -106,7 +106,7 @@ TEST_F(PipelineTest, CullingAndFrontFaces) {
 }
 
 TEST_F(PipelineTest, Wireframe) {
-    if (!device.getFeatures().has(FeatureWireframe)) GTEST_SKIP() << "the adapter has no wireframe";
+    GLINT_NEED_FEATURE(FeatureWireframe);
     const std::vector<Pixel> pixels =
         drawVertices(positions([](Pipeline& pipeline) { pipeline.setFillMode(Pipeline::FillModeLine); }), left_half);
     EXPECT_GT(countPixels(pixels, red), 20u);
@@ -275,7 +275,7 @@ TEST_F(PipelineTest, SpecialisedStages) {
 }
 
 TEST_F(PipelineTest, GeometryShader) {
-    if (!device.getFeatures().has(FeatureGeometryShader)) GTEST_SKIP() << "the adapter has no geometry shaders";
+    GLINT_NEED_FEATURE(FeatureGeometryShader);
     const Pipeline pipeline =
         makePipeline("void main() { gl_Position = vec4(0.0, 0.0, 0.5, 1.0); }", red_fragment, [](Pipeline& p) {
             p.setPrimitive(Pipeline::PrimitivePoint);
@@ -299,7 +299,7 @@ TEST_F(PipelineTest, GeometryShader) {
 }
 
 TEST_F(PipelineTest, Tessellation) {
-    if (!device.getFeatures().has(FeatureTessellation)) GTEST_SKIP() << "the adapter has no tessellation";
+    GLINT_NEED_FEATURE(FeatureTessellation);
     const Pipeline pipeline = makePipeline(
         "void main() { gl_Position = vec4(vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 4.0 - 1.0, 0.5, 1.0); }",
         red_fragment, [](Pipeline& p) {

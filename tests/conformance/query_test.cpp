@@ -21,7 +21,7 @@ protected:
 }  // namespace
 
 TEST_F(QueryTest, TimesGrowWithTheWork) {
-    if (!device.getFeatures().has(FeatureTimestamps)) GTEST_SKIP() << "the adapter has no timestamps";
+    GLINT_NEED_FEATURE(FeatureTimestamps);
     const Query all = device.createQuery(Query::TypeTime, "all");
     const Query part = device.createQuery(Query::TypeTime, "part");
     EXPECT_EQ(all.getType(), Query::TypeTime);
@@ -51,7 +51,7 @@ TEST_F(QueryTest, TimesGrowWithTheWork) {
 }
 
 TEST_F(QueryTest, CountsComputeInvocations) {
-    if (!device.getFeatures().has(FeatureStatistics)) GTEST_SKIP() << "the adapter has no statistics";
+    GLINT_NEED_FEATURE(FeatureStatistics);
     const Query query = device.createQuery(Query::TypeStatistics);
     const Buffer buffer = makeBuffer(std::vector<uint32_t>(256));
     for (int i = 1; i <= 3; i++) {  // a query is used again
@@ -70,7 +70,7 @@ TEST_F(QueryTest, CountsComputeInvocations) {
 }
 
 TEST_F(QueryTest, CountsGraphicsInvocations) {
-    if (!device.getFeatures().has(FeatureStatistics)) GTEST_SKIP() << "the adapter has no statistics";
+    GLINT_NEED_FEATURE(FeatureStatistics);
     const Query query = device.createQuery(Query::TypeStatistics);
     const Texture color = makeTexture(FormatRGBAu8n, 16, 16);
     draw(color, [&](Command& list) {

@@ -120,7 +120,7 @@ class TracingTest : public ConformanceTest {
 protected:
     void SetUp() override {
         ConformanceTest::SetUp();
-        if (device && !device.getFeatures().computeTracing) GTEST_SKIP() << "the adapter has no ray queries";
+        GLINT_NEED_FEATURE(FeatureComputeTracing);
     }
 
     Buffer input(const void* data, size_t size) {
@@ -628,7 +628,7 @@ TEST_F(TracingTest, ShortIntervals) {
 }
 
 TEST_F(TracingTest, QueriesInFragments) {
-    if (!device.getFeatures().fragmentTracing) GTEST_SKIP() << "the adapter has no ray queries in fragments";
+    GLINT_NEED_FEATURE(FeatureFragmentTracing);
     const Tracing ball = bottom({&sphere}), block = bottom({&box});
     const Matrix4x4f turned = translate({1, 0.5f, 0.8f}) * rotateX(40) * rotateY(30);
     const Tracing scene = device.createTracing({instance(ball), instance(block, turned)});

@@ -58,7 +58,7 @@ TEST(Golden, TracedTori) {
 
 // A mesh of a file, and the fragment form.
 TEST(Golden, TracedBunny) {
-    if (bunnyPath().empty()) GTEST_SKIP() << "needs the Stanford bunny of Debian's package glmark2-data";
+    GLINT_NEED_BUNNY();
     const std::string mesh = "--size 160x90 --single --time 3 --fragment --mesh '" + bunnyPath().string() + "'";
     expectGolden("05_hello_tracing", mesh, "05_hello_tracing_bunny", {.texels = 72});
 }

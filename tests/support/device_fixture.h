@@ -39,6 +39,11 @@ Device sharedDevice(const std::string& api);
 /// The log of a shared device.
 MessageLog sharedLog(const std::string& api);
 
+/// In a test's body or SetUp: skips it where the adapter lacks a feature, and says which.
+#define GLINT_NEED_FEATURE(feature)                   \
+    if (device && !device.getFeatures().has(feature)) \
+    GTEST_SKIP() << "'" << device.getInfo().name << "' lacks " << ::glint::toString(feature)
+
 /// A test with a device. It fails if there is none, and if the device tells anything that the test did not ask for.
 class DeviceTest : public ::testing::Test {
 protected:

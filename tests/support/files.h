@@ -30,4 +30,8 @@ std::filesystem::path testsDir();
 /// The Stanford bunny of Debian's package glmark2-data (69,666 triangles); empty if the package is not installed.
 std::filesystem::path bunnyPath();
 
+/// At the beginning of a test: skips it where the bunny is not installed.
+#define GLINT_NEED_BUNNY() \
+    if (::glint::test::bunnyPath().empty()) GTEST_SKIP() << "needs the Stanford bunny (Debian's package glmark2-data)"
+
 }  // namespace glint::test

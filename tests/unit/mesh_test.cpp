@@ -370,8 +370,8 @@ TEST(Mesh, Files) {
 }
 
 TEST(Mesh, StanfordBunny) {
+    GLINT_NEED_BUNNY();
     const std::filesystem::path path = bunnyPath();
-    if (path.empty()) GTEST_SKIP() << "the bunny of Debian's package glmark2-data is not installed";
     Expected<Mesh> mesh = Mesh::load(path);
     ASSERT_THAT(mesh, IsOk());
     EXPECT_EQ(mesh->triangleCount(), 69666u);

@@ -145,7 +145,7 @@ class RewriteGpuTest : public ConformanceTest {
 protected:
     void SetUp() override {
         ConformanceTest::SetUp();
-        if (device && !device.getFeatures().computeTracing) GTEST_SKIP() << "the adapter has no ray queries";
+        GLINT_NEED_FEATURE(FeatureComputeTracing);
     }
 
     Buffer input(const void* data, size_t size) {
@@ -715,7 +715,7 @@ void main() {
 
 // A whole fragment shader: a picture from either engine.
 TEST_F(RewriteGpuTest, FragmentShader) {
-    if (!device.getFeatures().fragmentTracing) GTEST_SKIP() << "no ray queries in fragment shaders";
+    GLINT_NEED_FEATURE(FeatureFragmentTracing);
     const std::string text = R"(
 layout(set = 2, binding = 3) uniform accelerationStructureEXT scene;
 layout(location = 0) out vec4 color;

@@ -1,5 +1,6 @@
 // Hierarchies of the software tracing engine, looked at on the CPU.
 
+#include "support/hierarchies.h"
 #include "support/matchers.h"
 #include "support/reference.h"
 
@@ -25,23 +26,6 @@ using namespace glint::detail;
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-
-TriangleGeometry geometryOf(const Mesh& mesh) {
-    TriangleGeometry geometry;
-    geometry.positions = reinterpret_cast<const std::byte*>(mesh.positions.data());
-    geometry.vertices = static_cast<uint32_t>(mesh.positions.size());
-    geometry.indices = reinterpret_cast<const std::byte*>(mesh.indices.data());
-    geometry.index = TriangleGeometry::Index::Uint32;
-    geometry.triangles = static_cast<uint32_t>(mesh.triangleCount());
-    return geometry;
-}
-
-Hierarchy build(const Mesh& mesh, BuildMode mode, ThreadPool* pool = nullptr) {
-    const TriangleGeometry geometry = geometryOf(mesh);
-    Expected<Hierarchy> hierarchy = buildHierarchy(std::span(&geometry, 1), mode, pool);
-    if (!hierarchy) throw std::runtime_error(hierarchy.error().text());
-    return std::move(*hierarchy);
-}
 
 bool equal(const Hierarchy& a, const Hierarchy& b) {
     return a.bytes() == b.bytes() && std::memcmp(a.texels.data(), b.texels.data(), a.bytes()) == 0 &&
@@ -150,7 +134,7 @@ TEST(TracingHierarchy, HoldsItsPrimitivesForAllSizes) {
         for (const uint32_t count : {0u,  1u,   2u,   3u,   7u,    8u,    9u,    15u,    16u,    17u,    63u,   64u,
                                      65u, 255u, 256u, 257u, 4095u, 4096u, 4097u, 16383u, 16384u, 16385u, 40000u}) {
             SCOPED_TRACE(count);
-            const Hierarchy hierarchy = build(soup(count, count), mode);
+            const Hierarchy hierarchy = hierarchyOf(soup(count, count), mode);
             EXPECT_EQ(hierarchy.records, count);
             EXPECT_EQ(hierarchy.inactive, 0u);
             const Walk walk(hierarchy);
@@ -163,10 +147,10 @@ TEST(TracingHierarchy, HoldsItsPrimitivesForAllSizes) {
 TEST(TracingHierarchy, IsTheSameForAnyNumberOfThreads) {
     const Mesh mesh = soup(50000, 1);
     for (const BuildMode mode : both_modes) {
-        const Hierarchy one = build(mesh, mode);
+        const Hierarchy one = hierarchyOf(mesh, mode);
         for (const uint32_t threads : {1u, 2u, 3u, 7u}) {
             ThreadPool pool(threads);
-            EXPECT_TRUE(equal(one, build(mesh, mode, &pool))) << threads << " threads";
+            EXPECT_TRUE(equal(one, hierarchyOf(mesh, mode, &pool))) << threads << " threads";
         }
     }
 }
@@ -204,7 +188,7 @@ TEST(TracingHierarchy, StandsWhatBuildersStumbleOver) {
     for (const auto& [name, mesh] : cases) {
         SCOPED_TRACE(name);
         for (const BuildMode mode : both_modes) {
-            const Hierarchy hierarchy = build(mesh, mode);
+            const Hierarchy hierarchy = hierarchyOf(mesh, mode);
             EXPECT_EQ(hierarchy.records + hierarchy.inactive, mesh.triangleCount());
             const Walk walk(hierarchy);
         }
@@ -217,13 +201,13 @@ TEST(TracingHierarchy, LeavesOutWhatIsNotFinite) {
     mesh.positions[3 * 20 + 1].y = infinity;
     mesh.positions[3 * 30 + 2].z = -infinity;
     for (const BuildMode mode : both_modes) {
-        const Hierarchy hierarchy = build(mesh, mode);
+        const Hierarchy hierarchy = hierarchyOf(mesh, mode);
         EXPECT_EQ(hierarchy.records, 97u);
         EXPECT_EQ(hierarchy.inactive, 3u);
         const Walk walk(hierarchy);
     }
     for (Vector3f& p : mesh.positions) p.x = nan;
-    const Hierarchy empty = build(mesh, BuildMode::Quality);
+    const Hierarchy empty = hierarchyOf(mesh, BuildMode::Quality);
     EXPECT_EQ(empty.records, 0u);
     const Walk walk(empty);
 }
@@ -305,8 +289,8 @@ TEST(TracingHierarchy, ExplainsBadInput) {
 TEST(TracingHierarchy, RefitsToTheSameAndToOtherCoordinates) {
     for (const BuildMode mode : both_modes) {
         Mesh mesh = soup(20000, 15);
-        const Hierarchy built = build(mesh, mode);
-        Hierarchy refitted = build(mesh, mode);
+        const Hierarchy built = hierarchyOf(mesh, mode);
+        Hierarchy refitted = hierarchyOf(mesh, mode);
         const TriangleGeometry geometry = geometryOf(mesh);
         ASSERT_TRUE(refitHierarchy(refitted, std::span(&geometry, 1)));
         EXPECT_TRUE(equal(built, refitted));
@@ -317,11 +301,11 @@ TEST(TracingHierarchy, RefitsToTheSameAndToOtherCoordinates) {
         ThreadPool pool(3);
         ASSERT_TRUE(refitHierarchy(refitted, std::span(&geometry, 1)));
         const Walk walk(refitted);
-        Hierarchy parallel = build(soup(20000, 15), mode);
+        Hierarchy parallel = hierarchyOf(soup(20000, 15), mode);
         ASSERT_TRUE(refitHierarchy(parallel, std::span(&geometry, 1), &pool));
         EXPECT_TRUE(equal(refitted, parallel));
     }
-    Hierarchy hierarchy = build(soup(10, 16), BuildMode::Fast);
+    Hierarchy hierarchy = hierarchyOf(soup(10, 16), BuildMode::Fast);
     const Mesh other = soup(11, 17);
     const TriangleGeometry geometry = geometryOf(other);
     EXPECT_EQ(refitHierarchy(hierarchy, std::span(&geometry, 1)).error().id(), "tracing.refit");
@@ -342,8 +326,8 @@ TEST(TracingHierarchy, QualityIsWorthItsTime) {
         mesh.indices.push_back(static_cast<uint32_t>(mesh.positions.size()));
         mesh.positions.push_back(Vector3f(1e4f, c == 1 ? 1.0f : 0.0f, c == 2 ? 1.0f : 0.0f));
     }
-    const Walk quality(build(mesh, BuildMode::Quality));
-    const Walk fast(build(mesh, BuildMode::Fast));
+    const Walk quality(hierarchyOf(mesh, BuildMode::Quality));
+    const Walk fast(hierarchyOf(mesh, BuildMode::Fast));
     EXPECT_LT(quality.area, 0.5 * fast.area);
 }
 

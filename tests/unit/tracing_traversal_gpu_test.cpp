@@ -2,6 +2,7 @@
 // where rays slip through.
 
 #include "support/device_fixture.h"
+#include "support/hierarchies.h"
 #include "support/reference.h"
 
 #include <glint/geometry/primitives.h>
@@ -19,22 +20,10 @@ namespace {
 
 using namespace glint::detail;
 
-TriangleGeometry geometryOf(const Mesh& mesh) {
-    TriangleGeometry geometry;
-    geometry.positions = reinterpret_cast<const std::byte*>(mesh.positions.data());
-    geometry.vertices = static_cast<uint32_t>(mesh.positions.size());
-    geometry.indices = reinterpret_cast<const std::byte*>(mesh.indices.data());
-    geometry.index = TriangleGeometry::Index::Uint32;
-    geometry.triangles = static_cast<uint32_t>(mesh.triangleCount());
-    return geometry;
-}
-
 Hierarchy buildMesh(const Mesh& mesh, BuildMode mode = BuildMode::Quality, bool opaque = true) {
     TriangleGeometry geometry = geometryOf(mesh);
     geometry.opaque = opaque;
-    Expected<Hierarchy> hierarchy = buildHierarchy(std::span<const TriangleGeometry>(&geometry, 1), mode);
-    if (!hierarchy) throw std::runtime_error(hierarchy.error().text());
-    return std::move(*hierarchy);
+    return hierarchyOf(geometry, mode);
 }
 
 /// As the kernel of batch.h writes it.
@@ -399,7 +388,7 @@ std::string describe(size_t ray, const QueryHit& hit) {
 bool near(const Vector3f& a, const Vector3f& b, float bound) { return glm::length(a - b) <= bound; }
 
 TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
-    if (!device.getFeatures().computeTracing) GTEST_SKIP() << "the driver has no ray queries to compare with";
+    GLINT_NEED_FEATURE(FeatureComputeTracing);
     const Mesh meshes[] = {createTorus(0.4f, 0.15f, 16, 8), createSphere(0.5f, 1)};
     const float box[6] = {-0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f};
 

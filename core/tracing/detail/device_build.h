@@ -1,0 +1,143 @@
+#pragma once
+
+// Hierarchies built and refitted by compute kernels (shaders/tracing/build), for what changes each frame. This is the
+// half on the host: a plan of dispatches for whoever has a device to play. It knows no device, reads nothing and
+// depends on counts only; what is in the buffers is looked at by the kernels. docs/tracing.md has the algorithm.
+//
+// The result has the form that buildHierarchy gives and lies in the heap: the one row of texels that shaders trace
+// through. Playing a plan, each pass after the one before has finished:
+//
+//   for (const BuildPass& pass : plan.passes) {
+//       kernel      createShaderGLSL(kernelSource(pass.kernel), "GLINT_TRACING_MEMORY=..."), made once
+//       bindings    in this order: the heap if the kernel has it (usesHeap; a storage texel buffer of FormatRGBAu32,
+//                   GLINT_TRACING_BUFFERS storage buffers of 128 MiB, or none where it is reached by its address), the
+//                   scratch memory, pass.inputs
+//       constants   pass.constants as push constants
+//       dispatch    pass.threads
+//   }
+//
+// One build after another may use the same scratch memory; builds whose scratch memories differ may run side by side.
+
+#include <glint/tracing/detail/hierarchy.h>
+
+#include <array>
+#include <string>
+
+namespace glint::detail {
+
+/// A geometry in device memory, or the instances of a top level.
+struct DeviceGeometry {
+    uint32_t primitives = 0;  ///< triangles, boxes or instances
+    uint64_t offset = 0;      ///< bytes, a multiple of 4, of the first vertex, box or DeviceInstance in its buffer
+    uint32_t stride = 12;     ///< bytes, a multiple of 4, from one to the next: 24 at least for boxes, 64 for instances
+    bool opaque = true;
+    // Of triangles:
+    uint32_t vertices = 0;  ///< a triangle with a greater index is inactive
+    TriangleGeometry::Index index = TriangleGeometry::Index::None;
+    uint64_t index_offset = 0;  ///< bytes, a multiple of 2 or 4
+};
+
+/// An instance as the kernels read it.
+struct DeviceInstance {
+    static constexpr uint32_t none = 0xffffffffu;
+
+    float transform[12];         ///< object to world, row-major 3x4
+    uint32_t texel;              ///< of the heap, where its hierarchy begins; `none` makes it inactive
+    uint32_t custom_index_mask;  ///< custom index, the mask in bits 24-31
+    uint32_t offset_flags;       ///< offset, the flags in bits 24-31
+    uint32_t unused;
+};
+static_assert(sizeof(DeviceInstance) == 64);
+
+/// What is built: one geometry if it is of instances.
+struct DeviceInput {
+    Hierarchy::Kind kind = Hierarchy::Kind::Triangles;
+    std::vector<DeviceGeometry> geometries;
+};
+
+/// The programs, by what they do.
+enum class BuildKernel : uint8_t {
+    Begin,      ///< clears the state in front of the scratch memory
+    Instances,  ///< records of the instances, and their boxes for the kernels for boxes
+    TriangleBounds,
+    BoxBounds,  ///< box of all active primitives, and their number
+    TriangleCodes,
+    BoxCodes,     ///< places along the curve, as keys to sort
+    SortCount,    ///< digits of each tile of keys
+    SortScan,     ///< where each tile's keys with a digit go, among those with that digit
+    SortScatter,  ///< a stable pass; the last one gives each primitive the place of its record
+    Header,
+    TriangleRecords,
+    BoxRecords,
+    Split,   ///< which runs of primitives, or of the nodes below, become nodes
+    Fit,     ///< boxes of a level's nodes
+    Places,  ///< of a hierarchy that exists: where each primitive's record is
+};
+constexpr uint32_t build_kernels = 15;
+
+/// GLSL of a kernel, to be compiled with the macros of shaders/tracing/memory.h.
+std::string kernelSource(BuildKernel kernel);
+/// True if it reads or writes the heap.
+bool usesHeap(BuildKernel kernel);
+
+/// The push constants: GlintBuild in shaders/tracing/build/constants.h. Places in scratch memory count words.
+struct BuildConstants {
+    uint32_t heap_address[2];  ///< the player's, where the heap is reached by its address; else unused
+    uint32_t hierarchy;        ///< first texel
+    uint32_t primitives;       ///< of all geometries
+    uint32_t count;            ///< what there is to do: primitives of a geometry, tiles of keys, nodes
+    uint32_t words[20];        ///< by kernel
+};
+static_assert(sizeof(BuildConstants) <= 128 && sizeof(BuildConstants) % 4 == 0);
+
+/// A storage buffer of a pass.
+struct BuildBinding {
+    enum class Buffer : uint8_t { Data, Indices, Scratch };  ///< Data: vertices, boxes, instances
+
+    Buffer buffer = Buffer::Data;
+    uint32_t geometry = 0;  ///< whose
+    uint64_t offset = 0;    ///< bytes, a multiple of the alignment that was asked for
+    /// A multiple of 4, so up to 2 bytes of it can be beyond the last of an odd number of 16-bit indices.
+    uint64_t size = 0;
+};
+
+struct BuildPass {
+    BuildKernel kernel = BuildKernel::Begin;
+    uint32_t threads = 0;  ///< 1 at least; at most 65535 groups
+    uint32_t input_count = 0;
+    std::array<BuildBinding, 2> inputs;
+    BuildConstants constants = {};
+};
+
+/// What a hierarchy takes.
+struct DeviceSizes {
+    uint64_t texels = 0;         ///< of the heap
+    uint64_t build_scratch = 0;  ///< bytes; bound as one storage buffer
+    uint64_t refit_scratch = 0;
+};
+
+/// Nodes by their height, for refitting. A hierarchy built on the device has those of one height in a row; one built on
+/// the host needs a table: see buildHierarchy.
+struct RefitLevels {
+    uint32_t table = 0;            ///< texel of the hierarchy where the table begins; 0 if there is none
+    std::vector<uint32_t> counts;  ///< of nodes, the lowest first
+};
+
+struct BuildPlan {
+    std::vector<BuildPass> passes;
+    uint64_t scratch = 0;  ///< bytes
+    RefitLevels levels;    ///< of the hierarchy
+};
+
+/// Errors: "tracing.too_large" (more than max_primitives).
+Expected<DeviceSizes> deviceSizes(const DeviceInput& input);
+
+/// Builds at a texel of the heap. `alignment`: of storage bindings' offsets, bytes (Features::storageAlignment).
+/// Errors: those of deviceSizes.
+Expected<BuildPlan> planBuild(const DeviceInput& input, uint32_t texel, uint32_t alignment);
+
+/// Takes the coordinates again and keeps the tree, as refitHierarchy does. `levels` are those of the build, and so are
+/// the geometries' counts and kinds of indices. A top level takes its instances' matrices and hierarchies again too.
+Expected<BuildPlan> planRefit(const DeviceInput& input, const RefitLevels& levels, uint32_t texel, uint32_t alignment);
+
+}  // namespace glint::detail

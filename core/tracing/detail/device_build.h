@@ -57,36 +57,64 @@ struct DeviceInput {
 
 /// The programs, by what they do.
 enum class BuildKernel : uint8_t {
-    Begin,      ///< clears the state in front of the scratch memory
-    Instances,  ///< records of the instances, and their boxes for the kernels for boxes
-    TriangleBounds,
-    BoxBounds,  ///< box of all active primitives, and their number
-    TriangleCodes,
-    BoxCodes,     ///< places along the curve, as keys to sort
-    SortCount,    ///< digits of each tile of keys
-    SortScan,     ///< where each tile's keys with a digit go, among those with that digit
-    SortScatter,  ///< a stable pass; the last one gives each primitive the place of its record
+    Begin,          ///< clears the state in front of the scratch memory
+    TriangleBoxes,  ///< a box for each primitive, their common box and the number of active ones
+    BoxBoxes,
+    InstanceBoxes,  ///< and the instances' records
+    Codes,          ///< places along the curve, as keys to sort
+    SortCount,      ///< digits of each tile of keys
+    SortScan,       ///< where each tile's keys with a digit go, among those with that digit
+    SortScatter,
+    Tree,      ///< a binary tree over the keys, with boxes and costs, from the leaves up
+    Collapse,  ///< which binary nodes become nodes: one level
+    ScanSum,   ///< the children of a tile of nodes
+    ScanApply,
+    Place,  ///< gives each node its place, and each primitive that of its record
     Header,
+    Nodes,
     TriangleRecords,
     BoxRecords,
-    Split,   ///< which runs of primitives, or of the nodes below, become nodes
-    Fit,     ///< boxes of a level's nodes
-    Places,  ///< of a hierarchy that exists: where each primitive's record is
+    RefitParents,  ///< of a hierarchy that exists
+    RefitPlaces,   ///< where each primitive's record is
+    RefitTriangles,
+    RefitBoxes,
+    RefitHeader,
+    RefitNodes,  ///< from the leaves up
 };
-constexpr uint32_t build_kernels = 15;
+constexpr uint32_t build_kernels = 23;
 
 /// GLSL of a kernel, to be compiled with the macros of shaders/tracing/memory.h.
 std::string kernelSource(BuildKernel kernel);
 /// True if it reads or writes the heap.
 bool usesHeap(BuildKernel kernel);
 
-/// The push constants: GlintBuild in shaders/tracing/build/constants.h. Places in scratch memory count words.
+/// The push constants: GlintBuild in shaders/tracing/build/common.h. Places in scratch memory count words.
 struct BuildConstants {
     uint32_t heap_address[2];  ///< the player's, where the heap is reached by its address; else unused
     uint32_t hierarchy;        ///< first texel
+    uint32_t kind;             ///< Hierarchy::Kind
+    uint32_t instances;        ///< texel of the hierarchy where the instances begin
     uint32_t primitives;       ///< of all geometries
-    uint32_t count;            ///< what there is to do: primitives of a geometry, tiles of keys, nodes
-    uint32_t words[20];        ///< by kernel
+    uint32_t count;            ///< what there is to do: primitives of a geometry, tiles of keys, ...
+    uint32_t step;             ///< the digit's first bit, or the level of nodes
+    uint32_t levels;           ///< of nodes, at most
+    uint32_t tie_bits;         ///< of the places among keys
+
+    uint32_t boxes;
+    uint32_t keys;      ///< read
+    uint32_t keys_out;  ///< written
+    uint32_t nodes;
+    uint32_t list;    ///< of nodes to come
+    uint32_t sums;    ///< of children
+    uint32_t counts;  ///< of tiles
+
+    uint32_t first;     ///< the geometry's first primitive, in the row of all
+    uint32_t geometry;  ///< its index, and Record::opaque_bit
+    uint32_t data;      ///< first word of its data in what is bound
+    uint32_t stride;    ///< words
+    uint32_t vertices;
+    uint32_t index_size;  ///< words of 16 bits; 0 without indices
+    uint32_t index;       ///< first index in what is bound
 };
 static_assert(sizeof(BuildConstants) <= 128 && sizeof(BuildConstants) % 4 == 0);
 
@@ -103,41 +131,34 @@ struct BuildBinding {
 
 struct BuildPass {
     BuildKernel kernel = BuildKernel::Begin;
-    uint32_t threads = 0;  ///< 1 at least; at most 65535 groups
+    uint32_t threads = 0;  ///< 1 at least, at most 2^20
     uint32_t input_count = 0;
     std::array<BuildBinding, 2> inputs;
     BuildConstants constants = {};
 };
 
-/// What a hierarchy takes.
-struct DeviceSizes {
-    uint64_t texels = 0;         ///< of the heap
-    uint64_t build_scratch = 0;  ///< bytes; bound as one storage buffer
-    uint64_t refit_scratch = 0;
-};
-
-/// Nodes by their height, for refitting. A hierarchy built on the device has those of one height in a row; one built on
-/// the host needs a table: see buildHierarchy.
-struct RefitLevels {
-    uint32_t table = 0;            ///< texel of the hierarchy where the table begins; 0 if there is none
-    std::vector<uint32_t> counts;  ///< of nodes, the lowest first
-};
-
 struct BuildPlan {
     std::vector<BuildPass> passes;
-    uint64_t scratch = 0;  ///< bytes
-    RefitLevels levels;    ///< of the hierarchy
+    uint64_t scratch = 0;  ///< bytes, bound as one storage buffer
+};
+
+/// What a hierarchy built on the device takes.
+struct DeviceSizes {
+    uint64_t texels = 0;         ///< of the heap, in the worst case; what is used is known to the header on the device
+    uint32_t nodes = 0;          ///< at most
+    uint64_t build_scratch = 0;  ///< bytes
 };
 
 /// Errors: "tracing.too_large" (more than max_primitives).
 Expected<DeviceSizes> deviceSizes(const DeviceInput& input);
 
-/// Builds at a texel of the heap. `alignment`: of storage bindings' offsets, bytes (Features::storageAlignment).
-/// Errors: those of deviceSizes.
+/// Builds at a texel of the heap. `alignment`: of storage bindings' offsets, bytes, at most 256
+/// (Features::storageAlignment). Errors: those of deviceSizes.
 Expected<BuildPlan> planBuild(const DeviceInput& input, uint32_t texel, uint32_t alignment);
 
-/// Takes the coordinates again and keeps the tree, as refitHierarchy does. `levels` are those of the build, and so are
-/// the geometries' counts and kinds of indices. A top level takes its instances' matrices and hierarchies again too.
-Expected<BuildPlan> planRefit(const DeviceInput& input, const RefitLevels& levels, uint32_t texel, uint32_t alignment);
+/// Takes the coordinates again and keeps the tree, as refitHierarchy does: of a hierarchy built on the device or on the
+/// host, with at most that many nodes (DeviceSizes::nodes, Hierarchy::nodes). Counts and indices are those of the
+/// build. A top level takes its instances' matrices and hierarchies again too. Errors: those of deviceSizes.
+Expected<BuildPlan> planRefit(const DeviceInput& input, uint32_t nodes, uint32_t texel, uint32_t alignment);
 
 }  // namespace glint::detail

@@ -122,6 +122,7 @@ Expected<Hierarchy> build(std::span<const typename Reader::Geometry> geometries,
         for (size_t i = begin; i < end; i++) {
             const size_t g = std::upper_bound(first.begin(), first.end(), order[i]) - first.begin() - 1;
             Record record = {};
+            record.row = order[i];
             record.primitive = static_cast<uint32_t>(order[i] - first[g]);
             record.geometry = static_cast<uint32_t>(g) | (geometries[g].opaque ? Record::opaque_bit : 0);
             Reader::read(geometries[g], record.primitive, record.values);

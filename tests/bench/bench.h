@@ -62,6 +62,7 @@ Benchmark startupBenchmark();
 Benchmark memoryBenchmark();
 Benchmark tracingSoftwareBenchmark();
 Benchmark tracingBuildBenchmark();
+Benchmark tracingDeviceBenchmark();
 Benchmark castBenchmark();
 Benchmark tracingLeaksBenchmark();
 

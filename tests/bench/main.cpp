@@ -49,10 +49,10 @@ int main(int argc, char** argv) {
     Report report(options);
     int failed = 0;
     int found = 0;
-    const Benchmark benchmarks[] = {
-        dispatchBenchmark(),     drawBenchmark(),   warmFrameBenchmark(),       tracingFrameBenchmark(),
-        startupBenchmark(),      memoryBenchmark(), tracingSoftwareBenchmark(), tracingBuildBenchmark(),
-        tracingLeaksBenchmark(), castBenchmark()};
+    const Benchmark benchmarks[] = {dispatchBenchmark(),        drawBenchmark(),         warmFrameBenchmark(),
+                                    tracingFrameBenchmark(),    startupBenchmark(),      memoryBenchmark(),
+                                    tracingSoftwareBenchmark(), tracingBuildBenchmark(), tracingDeviceBenchmark(),
+                                    tracingLeaksBenchmark(),    castBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

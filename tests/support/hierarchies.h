@@ -2,7 +2,10 @@
 
 // Meshes in hierarchies of the software tracing engine.
 
+#include "support/reference.h"
+
 #include <glint/format/mesh.h>
+#include <glint/tracing/detail/device_build.h>
 #include <glint/tracing/detail/hierarchy.h>
 
 #include <stdexcept>
@@ -32,6 +35,29 @@ inline detail::Hierarchy hierarchyOf(const detail::TriangleGeometry& geometry,
 inline detail::Hierarchy hierarchyOf(const Mesh& mesh, detail::BuildMode mode = detail::BuildMode::Quality,
                                      ThreadPool* pool = nullptr) {
     return hierarchyOf(geometryOf(mesh), mode, pool);
+}
+
+/// The same in device memory, each buffer from its begin.
+inline detail::DeviceGeometry deviceGeometryOf(const Mesh& mesh) {
+    detail::DeviceGeometry geometry;
+    geometry.primitives = static_cast<uint32_t>(mesh.triangleCount());
+    geometry.vertices = static_cast<uint32_t>(mesh.positions.size());
+    geometry.index = detail::TriangleGeometry::Index::Uint32;
+    return geometry;
+}
+
+/// Small triangles in a cube.
+inline Mesh soup(uint32_t triangles, uint64_t seed, double size = 1.0, double offset = 0.0) {
+    Random random(seed);
+    Mesh mesh;
+    for (uint32_t i = 0; i < triangles; i++) {
+        const Vector3d center(random.uniform(), random.uniform(), random.uniform());
+        for (uint32_t c = 0; c < 3; c++) {
+            mesh.indices.push_back(3 * i + c);
+            mesh.positions.push_back(Vector3f((center + 0.1 * random.direction()) * size + offset));
+        }
+    }
+    return mesh;
 }
 
 }  // namespace glint::test

@@ -1,6 +1,7 @@
 // Hierarchies of the software tracing engine, looked at on the CPU.
 
 #include "support/hierarchies.h"
+#include "support/hierarchy_walk.h"
 #include "support/matchers.h"
 #include "support/reference.h"
 
@@ -32,101 +33,6 @@ bool equal(const Hierarchy& a, const Hierarchy& b) {
            a.runs == b.runs && a.depth == b.depth;
 }
 
-/// Small triangles in a cube.
-Mesh soup(uint32_t triangles, uint64_t seed, double size = 1.0, double offset = 0.0) {
-    Random random(seed);
-    Mesh mesh;
-    for (uint32_t i = 0; i < triangles; i++) {
-        const Vector3d center(random.uniform(), random.uniform(), random.uniform());
-        for (uint32_t c = 0; c < 3; c++) {
-            mesh.indices.push_back(3 * i + c);
-            mesh.positions.push_back(Vector3f((center + 0.1 * random.direction()) * size + offset));
-        }
-    }
-    return mesh;
-}
-
-struct Bounds {
-    double lo[3] = {1e300, 1e300, 1e300};
-    double hi[3] = {-1e300, -1e300, -1e300};
-};
-
-/// Walks through a hierarchy and checks all that the traversal relies on.
-class Walk {
-public:
-    explicit Walk(const Hierarchy& hierarchy) : hierarchy_(hierarchy), seen_(hierarchy.records) {
-        const Header header = readHeader(hierarchy);
-        std::memcpy(grid_.minimum, header.minimum, sizeof(grid_.minimum));
-        grid_.step = header.step;
-        EXPECT_EQ(header.nodes, hierarchy.nodes);
-        EXPECT_EQ(header.records, hierarchy.records);
-        EXPECT_EQ(header.first_record, hierarchy.firstRecord());
-        node(1, 1);
-        EXPECT_EQ(visited_, hierarchy.nodes);
-        EXPECT_EQ(deepest_, hierarchy.depth);
-        EXPECT_LE(hierarchy.depth, max_depth);
-        EXPECT_EQ(std::count(seen_.begin(), seen_.end(), 1u), hierarchy.records) << "each record belongs to one leaf";
-    }
-
-    double area = 0.0;  ///< of all nodes' boxes but the root's, decoded: what the collapse keeps small
-
-private:
-    Bounds node(uint32_t index, uint32_t level) {
-        Bounds bounds;
-        if (index == 0 || index > hierarchy_.nodes) {
-            ADD_FAILURE() << "no node has the index " << index;
-            return bounds;
-        }
-        if (::testing::Test::HasFailure()) return bounds;  // one message is enough
-        visited_++;
-        deepest_ = std::max(deepest_, level);
-        Node node;
-        std::memcpy(&node, &hierarchy_.texels[4 * size_t(index)], sizeof(node));
-        EXPECT_LE(node.leaves(), node.children());
-        EXPECT_LE(node.children(), node_width);
-        for (uint32_t s = 0; s < node.children(); s++) {
-            const Bounds inner = s < node.leaves() ? record(node.record() + s) : this->node(node.child(s), level + 1);
-            double lo[3];
-            double hi[3];
-            node.box(grid_, s, lo, hi);
-            for (int axis = 0; axis < 3; axis++) {
-                if (!(inner.lo[axis] <= inner.hi[axis])) continue;
-                EXPECT_LE(lo[axis], inner.lo[axis]) << "node " << index << " child " << s;
-                EXPECT_GE(hi[axis], inner.hi[axis]) << "node " << index << " child " << s;
-                bounds.lo[axis] = std::min(bounds.lo[axis], inner.lo[axis]);
-                bounds.hi[axis] = std::max(bounds.hi[axis], inner.hi[axis]);
-            }
-            const double d[3] = {hi[0] - lo[0], hi[1] - lo[1], hi[2] - lo[2]};
-            if (s >= node.leaves()) area += d[0] * d[1] + d[1] * d[2] + d[2] * d[0];
-        }
-        return bounds;
-    }
-
-    Bounds record(uint32_t index) {
-        Bounds bounds;
-        if (index >= hierarchy_.records) {
-            ADD_FAILURE() << "no record has the index " << index;
-            return bounds;
-        }
-        seen_[index]++;
-        Record record;
-        std::memcpy(&record, &hierarchy_.texels[hierarchy_.firstRecord() + 3 * size_t(index)], sizeof(record));
-        const uint32_t corners = hierarchy_.kind == Hierarchy::Kind::Triangles ? 3 : 2;
-        if (!allInRange(record.values, 3 * corners)) return bounds;
-        for (uint32_t i = 0; i < 3 * corners; i++) {
-            bounds.lo[i % 3] = std::min(bounds.lo[i % 3], double(record.values[i]));
-            bounds.hi[i % 3] = std::max(bounds.hi[i % 3], double(record.values[i]));
-        }
-        return bounds;
-    }
-
-    const Hierarchy& hierarchy_;
-    Grid grid_;
-    std::vector<uint32_t> seen_;
-    uint32_t visited_ = 0;
-    uint32_t deepest_ = 0;
-};
-
 constexpr BuildMode both_modes[] = {BuildMode::Quality, BuildMode::Fast};
 
 TEST(TracingHierarchy, HoldsItsPrimitivesForAllSizes) {
@@ -137,7 +43,7 @@ TEST(TracingHierarchy, HoldsItsPrimitivesForAllSizes) {
             const Hierarchy hierarchy = hierarchyOf(soup(count, count), mode);
             EXPECT_EQ(hierarchy.records, count);
             EXPECT_EQ(hierarchy.inactive, 0u);
-            const Walk walk(hierarchy);
+            const HierarchyWalk walk(hierarchy);
             // What a triangle takes at the driver of the development machine, and what the root takes besides.
             EXPECT_LE(hierarchy.bytes(), 104 * uint64_t(count) + 128);
         }
@@ -190,7 +96,7 @@ TEST(TracingHierarchy, StandsWhatBuildersStumbleOver) {
         for (const BuildMode mode : both_modes) {
             const Hierarchy hierarchy = hierarchyOf(mesh, mode);
             EXPECT_EQ(hierarchy.records + hierarchy.inactive, mesh.triangleCount());
-            const Walk walk(hierarchy);
+            const HierarchyWalk walk(hierarchy);
         }
     }
 }
@@ -204,12 +110,12 @@ TEST(TracingHierarchy, LeavesOutWhatIsNotFinite) {
         const Hierarchy hierarchy = hierarchyOf(mesh, mode);
         EXPECT_EQ(hierarchy.records, 97u);
         EXPECT_EQ(hierarchy.inactive, 3u);
-        const Walk walk(hierarchy);
+        const HierarchyWalk walk(hierarchy);
     }
     for (Vector3f& p : mesh.positions) p.x = nan;
     const Hierarchy empty = hierarchyOf(mesh, BuildMode::Quality);
     EXPECT_EQ(empty.records, 0u);
-    const Walk walk(empty);
+    const HierarchyWalk walk(empty);
 }
 
 TEST(TracingHierarchy, TakesSeveralGeometriesAndFormsOfIndices) {
@@ -235,7 +141,7 @@ TEST(TracingHierarchy, TakesSeveralGeometriesAndFormsOfIndices) {
     const Expected<Hierarchy> hierarchy = buildHierarchy(geometries, BuildMode::Quality);
     ASSERT_TRUE(hierarchy) << hierarchy.error().text();
     EXPECT_EQ(hierarchy->records, 700u);
-    const Walk walk(*hierarchy);
+    const HierarchyWalk walk(*hierarchy);
     std::vector<uint32_t> seen(4 * 300);
     for (uint32_t i = 0; i < hierarchy->records; i++) {
         Record record;
@@ -267,7 +173,7 @@ TEST(TracingHierarchy, BuildsBoxes) {
     const Expected<Hierarchy> hierarchy = buildHierarchy(std::span(&geometry, 1), BuildMode::Quality);
     ASSERT_TRUE(hierarchy) << hierarchy.error().text();
     EXPECT_EQ(hierarchy->records, 998u);
-    const Walk walk(*hierarchy);
+    const HierarchyWalk walk(*hierarchy);
 }
 
 TEST(TracingHierarchy, ExplainsBadInput) {
@@ -300,7 +206,7 @@ TEST(TracingHierarchy, RefitsToTheSameAndToOtherCoordinates) {
         for (uint32_t i = 0; i < 3 * 64; i++) mesh.positions[i].y = infinity;
         ThreadPool pool(3);
         ASSERT_TRUE(refitHierarchy(refitted, std::span(&geometry, 1)));
-        const Walk walk(refitted);
+        const HierarchyWalk walk(refitted);
         Hierarchy parallel = hierarchyOf(soup(20000, 15), mode);
         ASSERT_TRUE(refitHierarchy(parallel, std::span(&geometry, 1), &pool));
         EXPECT_TRUE(equal(refitted, parallel));
@@ -326,8 +232,8 @@ TEST(TracingHierarchy, QualityIsWorthItsTime) {
         mesh.indices.push_back(static_cast<uint32_t>(mesh.positions.size()));
         mesh.positions.push_back(Vector3f(1e4f, c == 1 ? 1.0f : 0.0f, c == 2 ? 1.0f : 0.0f));
     }
-    const Walk quality(hierarchyOf(mesh, BuildMode::Quality));
-    const Walk fast(hierarchyOf(mesh, BuildMode::Fast));
+    const HierarchyWalk quality(hierarchyOf(mesh, BuildMode::Quality));
+    const HierarchyWalk fast(hierarchyOf(mesh, BuildMode::Fast));
     EXPECT_LT(quality.area, 0.5 * fast.area);
 }
 

@@ -19,7 +19,7 @@ struct Record {
     float values[9];
     uint32_t primitive;  ///< in its geometry
     uint32_t geometry;   ///< and opaque_bit
-    uint32_t unused;
+    uint32_t row;        ///< of the primitive in the row of all geometries
 };
 static_assert(sizeof(Record) == 3 * sizeof(Texel));
 

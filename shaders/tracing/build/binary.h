@@ -1,0 +1,81 @@
+// Binary nodes. The one that splits the sorted primitives between g and g + 1 has the index g. In scratch memory, 16
+// words for each:
+//
+//   0, 1    children: another's index, or GLINT_LEAF and a place among the sorted primitives
+//   2 - 7   box
+//   8 - 14  costs: the least sum of areas of the nodes below, if it gives its parent at most 1 .. 7 children
+//   15      where the subtree that came first ends
+//
+// and, once it has been chosen to become a node: 8 - 15 that node's children, leaves first, ended by GLINT_NONE; 0 the
+// node's place.
+#pragma once
+
+#include <glint/tracing/build/common.h>
+
+const uint GLINT_BINARY_BOX = 2u;
+const uint GLINT_BINARY_COSTS = 8u;
+const uint GLINT_BINARY_END = 15u;
+const uint GLINT_BINARY_CHILDREN = 8u;
+const uint GLINT_WIDTH = 8u;
+
+uint glintBinary(uint index) { return build.nodes + 16u * index; }
+bool glintIsLeaf(uint child) { return (child & GLINT_LEAF) != 0u; }
+
+// The primitive at a place among the sorted ones.
+uint glintPrimitiveAt(uint place) { return scratch[build.keys + 2u * place + 1u]; }
+
+GlintBox glintChildBox(uint child) {
+    if (glintIsLeaf(child)) return glintScratchBox(build.boxes + 6u * glintPrimitiveAt(child ^ GLINT_LEAF));
+    return glintScratchBox(glintBinary(child) + GLINT_BINARY_BOX);
+}
+
+// Half of a box's surface, where the scene's largest extent is 1.
+float glintHalfArea(GlintBox box, float scale) {
+    const vec3 d = (box.high - box.low) * scale;
+    return d.x * (d.y + d.z) + d.y * d.z;
+}
+float glintAreaScale() {
+    const GlintBox bounds = glintBounds();
+    const vec3 size = bounds.high - bounds.low;
+    const float extent = max(size.x, max(size.y, size.z));
+    return extent > 1e-30 ? 1.0 / extent : 0.0;
+}
+
+// What tells g from g + 1: the greater, the higher the first bit in which they differ. Codes first, then places.
+uint glintDifference(uint g) {
+    const uint codes = scratch[build.keys + 2u * g] ^ scratch[build.keys + 2u * (g + 1u)];
+    return codes != 0u ? codes | 0x40000000u : g ^ (g + 1u);
+}
+
+// No less than the levels of binary nodes from this one down: the bits that are left.
+uint glintHeightBound(uint g) {
+    const uint difference = glintDifference(g);
+    const uint bit = uint(findMSB(difference & 0x3fffffffu)) + 1u;
+    return difference >= 0x40000000u ? build.tie_bits + bit : bit;
+}
+
+// Index i - 1: for at most i children.
+struct GlintCosts {
+    float costs[7];
+};
+GlintCosts glintCosts(uint child) {
+    GlintCosts result;
+    for (uint i = 0u; i < 7u; i++)
+        result.costs[i] =
+            glintIsLeaf(child) ? 0.0 : uintBitsToFloat(scratch[glintBinary(child) + GLINT_BINARY_COSTS + i]);
+    return result;
+}
+
+// The cheapest way to give i children, 2 to 8, of two subtrees: the cost, and how many are the left one's.
+float glintDistribute(GlintCosts left, GlintCosts right, uint i, out uint best_left) {
+    float best = GLINT_MOST;
+    best_left = 1u;
+    for (uint k = 1u; k < i; k++) {
+        const float cost = left.costs[k - 1u] + right.costs[i - k - 1u];
+        if (cost < best) {
+            best = cost;
+            best_left = k;
+        }
+    }
+    return best;
+}

@@ -28,9 +28,22 @@ HandleType make(const Device& device, std::string_view name, Device::Where where
     return HandleType(object);
 }
 
+/// Structures of the software engine that are made to be traced, not to be built each frame.
+bool isBuiltOnHost(const Tracing& tracing) {
+    if (!tracing || !tracing.object()->device()->heap() || tracing.getType() == Tracing::TypeInstance) return false;
+    const auto& object = *static_cast<detail::TracingObject*>(tracing.object());
+    return !object.compacted && !(object.flags & (Tracing::FlagFastBuild | Tracing::FlagUpdate));
+}
+
 template <class Record>
 void transfer(const Device& device, Record&& record) {
     if (DeviceObject* object = opened(device)) object->transfer(std::forward<Record>(record));
+}
+
+/// At once, unlike what is queued; an error is the next submission's all the same.
+void buildOnHost(Device& device, const Tracing& tracing, const Buffer& scratch, Device::Where where) {
+    const Status status = device.buildTracings(std::span(&tracing, 1), scratch, 0, where);
+    if (!status) transfer(device, [&](RecorderCore& core) { core.keepError(status.error()); });
 }
 
 }  // namespace
@@ -180,12 +193,20 @@ void Device::setTracing(const Tracing& tracing, std::span<const Tracing::Instanc
 }
 
 void Device::buildTracing(const Tracing& tracing, const Buffer& scratch, Where where) {
+    if (isBuiltOnHost(tracing) && scratch.state() != ObjectState::Null) {
+        buildOnHost(*this, tracing, scratch, where);
+        return;
+    }
     transfer(*this, [&](RecorderCore& core) {
         if (core.check(scratch, "buildTracing", where)) core.buildTracing(tracing, scratch, 0, false, where);
     });
 }
 
 void Device::buildTracing(const Tracing& tracing, Where where) {
+    if (isBuiltOnHost(tracing)) {
+        buildOnHost(*this, tracing, Buffer(), where);
+        return;
+    }
     transfer(*this, [&](RecorderCore& core) { core.buildTracing(tracing, Buffer(), 0, false, where); });
 }
 

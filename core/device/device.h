@@ -45,6 +45,8 @@ struct DeviceDesc {
     std::string adapter;                 ///< index or part of a name; empty: $GLINT_ADAPTER, else the best
     FeatureMask required = FeatureNone;  ///< creation fails without them
     FeatureMask optional = FeatureAll;   ///< enabled where the adapter has them
+    /// Who answers ray queries. Auto: $GLINT_TRACING ("auto", "driver", "software"), else as TracingEngine says.
+    TracingEngine tracing = TracingEngine::Auto;
     /// Khronos validation layer with synchronisation checks. Default: $GLINT_VALIDATION is 1, or a debug build.
     enum class Validation : uint8_t { Default, Off, On } validation = Validation::Default;
     /// Called from any thread, must not call the device. Empty: errors and warnings go to the log.
@@ -77,7 +79,7 @@ public:
     explicit Device(detail::Object* object) : Handle(object) {}
 
     /// Opens an adapter. On failure the handle carries the error: "device.no_driver", "device.no_adapter",
-    /// "device.unsupported" (naming what is missing on which adapter), "device.api".
+    /// "device.unsupported" (naming what is missing on which adapter), "device.api", "device.tracing".
     static Device create(const DeviceDesc& desc = {}, Where where = Where::current());
     /// The adapters of an API.
     static Expected<std::vector<DeviceInfo>> adapters(std::string_view api = {}, Where where = Where::current());

@@ -17,18 +17,6 @@ using detail::RecorderCore;
 using detail::Ref;
 using detail::TracingObject;
 
-/// Records, plays and waits.
-template <class Record>
-Status playNow(DeviceObject& device, Device::Where where, Record&& record) {
-    const detail::RecorderPtr core = device.acquireRecorder(Queue::Main, "read-back");
-    record(*core);
-    Fence fence(new detail::FenceObject(&device));
-    RecorderCore* const recorders[] = {core.get()};
-    auto* fence_object = static_cast<detail::FenceObject*>(fence.object());
-    if (Status status = device.submit(recorders, fence_object, where); !status) return status;
-    return device.wait(fence_object->values, UINT64_MAX, where);
-}
-
 /// Reads `size` bytes that `record(core, staging)` copies.
 template <class Record>
 Status readBack(DeviceObject& device, void* data, uint64_t size, Device::Where where, Record&& record) {
@@ -40,7 +28,7 @@ Status readBack(DeviceObject& device, void* data, uint64_t size, Device::Where w
     BufferObject& memory = **staging;
     memory.retain();
     const Buffer buffer(&memory);
-    Status status = playNow(device, where, [&](RecorderCore& core) {
+    Status status = device.playNow("read-back", where, [&](RecorderCore& core) {
         record(core, buffer);
         if (!core.error()) core.hostRead(memory);
     });
@@ -161,11 +149,16 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
         if (first < objects.size()) core->buildTracings(objects.subspan(first), offsets, *memory, false, where);
     };
 
-    build(levels[0]);
-    if (flags & Tracing::FlagCompact) {
-        std::vector<TracingObject*> compacted;
+    std::vector<TracingObject*> compacted;
+    if (flags & Tracing::FlagCompact)
         for (TracingObject* object : levels[0])
             if (object->flags & Tracing::FlagCompact) compacted.push_back(object);
+    if (device.heap()) {
+        if (Status status = device.buildOnHost(levels[0], where); !status) return status;
+        // They have no room to spare.
+        for (TracingObject* object : compacted) object->compacted = true;
+    } else {
+        build(levels[0]);
         if (Status status = device.compact(core, compacted, where); !status) return status;
     }
     build(levels[1]);

@@ -28,4 +28,9 @@ std::string featureNames(FeatureMask mask) {
     return text;
 }
 
+const char* toString(TracingEngine engine) {
+    static constexpr const char* names[] = {"auto", "driver", "software"};
+    return engine <= TracingEngine::Software ? names[static_cast<size_t>(engine)] : "unknown";
+}
+
 }  // namespace glint

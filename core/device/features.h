@@ -36,6 +36,15 @@ enum Feature : uint64_t {
     FeatureCount = 25,
 };
 
+/// Who answers ray queries: the driver, or Glint's own hierarchies and traversal in the shader (docs/tracing.md).
+enum class TracingEngine : uint8_t {
+    Auto,  ///< the driver where the device is no CPU and offers ray queries, else software
+    Driver,
+    Software,
+};
+/// "auto", "driver", "software".
+const char* toString(TracingEngine engine);
+
 /// Features together.
 using FeatureMask = uint64_t;
 constexpr FeatureMask FeatureNone = 0;
@@ -63,6 +72,9 @@ struct Features {
     bool shaderu64 = false;
     bool atomicBufferu64 = false;
 
+    /// Who provides computeTracing and fragmentTracing; never Auto on an open device.
+    TracingEngine tracingEngine = TracingEngine::Driver;
+
     uint32_t recursionDepth = 0;  ///< of ray-tracing pipelines
     uint32_t subgroupSize = 0;
     uint32_t minSubgroupSize = 0;
@@ -82,6 +94,8 @@ struct Features {
     uint32_t maxAnisotropy = 1;
     uint64_t maxUniformSize = 0;  ///< bytes of one uniform binding
     uint64_t maxStorageSize = 0;  ///< bytes of one storage binding
+    uint64_t maxTexels = 0;       ///< elements of one texel binding
+    uint32_t maxSets = 0;         ///< descriptor sets of a program
     uint64_t maxBufferSize = 0;
     uint64_t maxTracingInstances = 0;
     uint64_t maxTracingPrimitives = 0;
@@ -104,6 +118,8 @@ struct DeviceInfo {
     uint32_t device_id = 0;
     bool cpu = false;          ///< runs on the CPU
     FeatureMask features = 0;  ///< all that the adapter offers
+    /// Of an open device: which engine answers ray queries, and why.
+    std::string tracing;
 };
 
 }  // namespace glint

@@ -19,6 +19,8 @@ using Type = SpecializationConstant::Type;
 
 /// More slots of one kind than any device has.
 constexpr uint32_t max_slots = 4096;
+/// Of one array in the software engine: a uniform block of references holds no more everywhere.
+constexpr uint32_t max_tracings = 1024;
 
 const char* toString(Type type) {
     switch (type) {
@@ -50,6 +52,13 @@ bool sameResource(const ShaderResource& a, const ShaderResource& b) {
 bool sameLayout(const BindingLayout& a, const BindingLayout& b) {
     return a.push_size == b.push_size && a.push_stages == b.push_stages &&
            std::ranges::equal(a.resources, b.resources, sameResource);
+}
+
+/// Has queries, or structures that a driver's would answer.
+bool asksRays(const Reflection& stage) {
+    return stage.uses_ray_query || std::ranges::any_of(stage.resources, [](const ShaderResource& resource) {
+               return resource.descriptor == SlotKind::Tracing;
+           });
 }
 
 std::vector<FileStamp> gatherStamps(const std::vector<Ref<ShaderObject>>& shaders) {
@@ -171,18 +180,21 @@ void ProgramObject::lastRelease() {
 
 Status ProgramObject::build(Where where) {
     stamps_ = gatherStamps(shaders);
-    Expected<Stages> stages = specialize(shaders, where);
+    Expected<std::vector<Ref<ShaderObject>>> compiled = forEngine(shaders, where);
+    if (!compiled) return compiled.error();
+    Expected<Stages> stages = specialize(std::move(*compiled), where);
     if (!stages) return stages.error();
     Expected<BindingLayout> merged = mergeStages(*stages, where);
     if (!merged) return merged.error();
 
     layout = std::move(*merged);
-    first_element.reserve(layout.resources.size());
-    for (const ShaderResource& resource : layout.resources) {
-        first_element.push_back(element_count);
-        element_count += resource.count;
-        if (resource.kind == SlotKind::Uniform) uniform_elements += resource.count;
-    }
+    for (const auto* resources : {&layout.resources, &layout.hidden})
+        for (const ShaderResource& resource : *resources) {
+            first_element.push_back(element_count);
+            first_uniform.push_back(uniform_elements);
+            element_count += resource.descriptorCount();
+            if (resource.descriptor == SlotKind::Uniform) uniform_elements += resource.descriptorCount();
+        }
     Expected<std::unique_ptr<Native>> made = createNative(*stages, where);
     if (!made) return made.error();
     native = std::move(*made);
@@ -212,7 +224,9 @@ Status ProgramObject::reload(bool& changed, Where where) {
         compiled.emplace_back(static_cast<ShaderObject*>(fresh.object()));
     }
     stamps_ = gatherStamps(compiled);
-    Expected<Stages> stages = specialize(compiled, where);
+    Expected<std::vector<Ref<ShaderObject>>> played = forEngine(compiled, where);
+    if (!played) return played.error();
+    Expected<Stages> stages = specialize(std::move(*played), where);
     if (!stages) return stages.error();
     Expected<BindingLayout> merged = mergeStages(*stages, where);
     if (!merged) return merged.error();
@@ -225,6 +239,28 @@ Status ProgramObject::reload(bool& changed, Where where) {
     shaders = std::move(compiled);
     changed = true;
     return {};
+}
+
+Expected<std::vector<Ref<ShaderObject>>> ProgramObject::forEngine(const std::vector<Ref<ShaderObject>>& compiled,
+                                                                  Where where) const {
+    std::vector<Ref<ShaderObject>> result = compiled;
+    const TracingHeap* const heap = device()->heap();
+    if (!heap) return result;
+    for (Ref<ShaderObject>& shader : result) {
+        const Reflection& reflection = shader->compiled.reflection;
+        if (!asksRays(reflection) || reflection.stage >= ShaderStage::RayGen) continue;
+        if (Error error = checkFeatures(reflection, where)) return unexpected(error);
+        ShaderSource source = shader->source;
+        source.tracing = heap->rewrite();
+        Expected<CompiledShader> rewritten = compileShader(source);
+        if (!rewritten) return unexpected(rewritten.error().at(where).named(name()));
+        auto object = Ref<ShaderObject>::adopt(new ShaderObject);
+        object->source = std::move(source);
+        object->compiled = std::move(*rewritten);
+        object->setReady();
+        shader = std::move(object);
+    }
+    return result;
 }
 
 Expected<ProgramObject::Stages> ProgramObject::specialize(std::vector<Ref<ShaderObject>> compiled, Where where) const {
@@ -273,11 +309,7 @@ Expected<BindingLayout> ProgramObject::mergeStages(const Stages& stages, Where w
 
 Error ProgramObject::checkFeatures(const Reflection& stage, Where where) const {
     FeatureMask needed = 0;
-    const bool tracing =
-        stage.uses_ray_query || std::ranges::any_of(stage.resources, [](const ShaderResource& resource) {
-            return resource.descriptor == SlotKind::Tracing;
-        });
-    if (tracing) needed |= stage.stage == ShaderStage::Compute ? FeatureComputeTracing : FeatureFragmentTracing;
+    if (asksRays(stage)) needed |= stage.stage == ShaderStage::Compute ? FeatureComputeTracing : FeatureFragmentTracing;
     if (stage.uses_addresses) needed |= FeatureBufferAddress;
     if (stage.uses_float64) needed |= FeatureShaderf64;
     if (stage.uses_int64) needed |= FeatureShaderu64;
@@ -297,6 +329,10 @@ Error ProgramObject::checkResource(const ShaderResource& resource, Where where) 
         return problem(
             where, ErrorCode::OutOfRange, "program.array",
             fmt::format("'{}' has {} elements, at most {} can be bound", resource.name, resource.count, max_slots));
+    if (resource.isRewritten() && resource.descriptor != SlotKind::Uniform)
+        return problem(where, ErrorCode::OutOfRange, "program.array",
+                       fmt::format("'{}' has {} structures, at most {} can be bound", resource.name, resource.count,
+                                   max_tracings));
     const uint64_t limit = device()->features().maxUniformSize;
     if (resource.kind == SlotKind::Uniform && resource.size > limit)
         return problem(

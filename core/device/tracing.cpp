@@ -2,6 +2,7 @@
 
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
+#include <glint/device/detail/software_tracing.h>
 
 #include <algorithm>
 
@@ -159,18 +160,21 @@ Status Tracing::create(Type type, Flags flags, std::source_location where) {
         return complain(ErrorCode::OutOfRange, "tracing.too_large", "{} primitives exceed the limit of {}",
                         getPrimitives(), limit);
 
+    if (device.heap()) {
+        Expected<std::unique_ptr<detail::NativeTracing>> made = detail::createSoftwareTracing(device, *object, where);
+        if (!made) return Status(object->fail(made.error().at(where)));
+        object->native = std::move(*made);
+        object->setReady();
+        return {};
+    }
     if (type == TypeInstance) {
         detail::NativeBufferDesc desc;
         desc.size = std::max<uint64_t>(object->instances, 1) * device.backend->instanceSize();
         desc.flags = Buffer::FlagTracing | Buffer::FlagAddress;
         desc.name = "instances";
-        Expected<std::unique_ptr<detail::NativeBuffer>> made = device.backend->createBuffer(desc);
-        if (!made) return Status(object->fail(made.error().at(where)));
-        object->instance_buffer = detail::Ref<detail::BufferObject>::adopt(new detail::BufferObject(&device));
-        object->instance_buffer->size = desc.size;
-        object->instance_buffer->flags = desc.flags;
-        object->instance_buffer->native = std::move(*made);
-        object->instance_buffer->setReady();
+        Expected<detail::Ref<detail::BufferObject>> made = device.createInternal(desc, where);
+        if (!made) return Status(object->fail(made.error()));
+        object->instance_buffer = std::move(*made);
     }
     detail::NativeTracingDesc desc;
     desc.type = type;

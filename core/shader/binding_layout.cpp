@@ -114,6 +114,8 @@ Expected<BindingLayout> mergeLayouts(std::span<const Reflection* const> stages) 
     resources = mergeResources(stages, &Reflection::hidden);
     if (!resources) return unexpected(resources.error());
     layout.hidden = std::move(*resources);
+    for (const ShaderResource& resource : layout.hidden)
+        layout.set_count = std::max(layout.set_count, resource.set + 1);
     for (uint32_t i = 0; i < layout.resources.size(); i++) {
         const ShaderResource& resource = layout.resources[i];
         layout.slots[static_cast<size_t>(resource.kind)].push_back(i);

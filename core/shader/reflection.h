@@ -82,6 +82,11 @@ struct ShaderResource {
     ImageDimension dimension = ImageDimension::None;
     ShaderMask stages = 0;
     std::vector<std::string> aliases;  ///< in a BindingLayout: further names of this binding, in any of the stages
+
+    /// An acceleration structure that the software engine answers for.
+    bool isRewritten() const { return kind == SlotKind::Tracing && descriptor != SlotKind::Tracing; }
+    /// Elements of the binding that the module declares.
+    uint32_t descriptorCount() const { return isRewritten() ? 1 : count; }
 };
 
 /// A specialisation constant of 32 bits or bool; wider and narrower ones are left out and keep their default.
@@ -140,7 +145,7 @@ struct BindingLayout {
     uint32_t push_size = 0;
     ShaderMask push_stages = 0;
     ShaderMask stages = 0;
-    uint32_t set_count = 0;  ///< highest set + 1, 0 without resources
+    uint32_t set_count = 0;  ///< highest set + 1, hidden ones included; 0 without resources
 
     const ShaderResource* find(SlotKind kind, uint32_t slot) const;
     /// Slot of the resource with this name (block name, instance name or variable name, in any stage), -1 if there is

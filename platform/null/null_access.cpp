@@ -151,17 +151,20 @@ private:
 
     void bindings(const Bindings& bindings, const BindingLayout& layout) {
         uint32_t element = 0;
-        for (const ShaderResource& resource : layout.resources) {
-            for (uint32_t i = 0; i < resource.count; i++, element++) {
-                if (element >= bindings.bound_count) return;
-                const BoundResource& bound = list_.at<BoundResource>(bindings.bound)[element];
-                if (bound.resource == none || resource.kind == SlotKind::Sampler) continue;
-                shaderAccess(bound, resource, ray_stages, Stage::RayTracing);
-                shaderAccess(bound, resource, early_stages, Stage::VertexShader);
-                shaderAccess(bound, resource, stageBit(ShaderStage::Fragment), Stage::Fragment);
-                shaderAccess(bound, resource, stageBit(ShaderStage::Compute), Stage::Compute);
-            }
-        }
+        for (const auto* resources : {&layout.resources, &layout.hidden})
+            for (const ShaderResource& resource : *resources)
+                for (uint32_t i = 0; i < resource.descriptorCount(); i++, element++) {
+                    if (element >= bindings.bound_count) return;
+                    const BoundResource& bound = list_.at<BoundResource>(bindings.bound)[element];
+                    if (bound.resource != none && resource.kind != SlotKind::Sampler) access(bound, resource);
+                }
+    }
+
+    void access(const BoundResource& bound, const ShaderResource& resource) {
+        shaderAccess(bound, resource, ray_stages, Stage::RayTracing);
+        shaderAccess(bound, resource, early_stages, Stage::VertexShader);
+        shaderAccess(bound, resource, stageBit(ShaderStage::Fragment), Stage::Fragment);
+        shaderAccess(bound, resource, stageBit(ShaderStage::Compute), Stage::Compute);
     }
 
     void shaderAccess(const BoundResource& bound, const ShaderResource& resource, ShaderMask mask, Stage stage) {
@@ -170,6 +173,10 @@ private:
         if (resource.read) need(bound.resource, stage, AccessRead, image ? bound.slice : Slice{}, resource.name);
         if (resource.write) need(bound.resource, stage, AccessWrite, image ? bound.slice : Slice{}, resource.name);
         if (resource.kind == SlotKind::Tracing) references(native<NullTracing>(bound.resource), stage);
+    }
+
+    static bool isHeap(const Object& object) {
+        return object.type() == ObjectType::Buffer && static_cast<const BufferObject&>(object).is_heap;
     }
 
     uint32_t find(const Object* object) const {
@@ -183,6 +190,8 @@ private:
     /// `resource` may be none, or the size of the list if it has no such resource.
     void need(uint32_t resource, Stage stage, uint8_t flags, const Slice& slice = {}, const std::string& what = {}) {
         if (resource == none) return;
+        // Writes to ranges of the heap are declared with the structures that lie there.
+        if (resource < list_.resources.size() && isHeap(*list_.resources[resource])) flags = AccessRead;
         const auto declares = [&](const Access& access) {
             return access.resource == resource && access.stage == stage && (access.flags & flags) == flags &&
                    access.slice.mip <= slice.mip && access.slice.mip + access.slice.mips >= slice.mip + slice.mips &&

@@ -64,6 +64,8 @@ Features describeFeatures(FeatureMask mask, const NullSettings& settings) {
     features.maxAnisotropy = mask & FeatureAnisotropy ? 16 : 1;
     features.maxUniformSize = 65536;
     features.maxStorageSize = 128ull << 20;
+    features.maxTexels = 1ull << 26;
+    features.maxSets = 8;
     features.maxBufferSize = 1ull << 30;
     features.maxTracingInstances = 1ull << 20;
     features.maxTracingPrimitives = 1ull << 24;

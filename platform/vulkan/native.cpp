@@ -108,6 +108,7 @@ VkPipeline nativePipeline(const Pipeline& pipeline) {
 }
 
 VkAccelerationStructureKHR nativeTracing(const Tracing& tracing) {
+    if (tracing && tracing.object()->device()->heap()) return VK_NULL_HANDLE;  // the software engine's
     const auto* native = nativeOf<VulkanTracing>(tracing);
     return native ? native->handle() : VK_NULL_HANDLE;
 }

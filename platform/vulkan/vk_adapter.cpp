@@ -404,6 +404,8 @@ Features describeFeatures(const Instance& instance, const Adapter& adapter, Feat
     features.maxAnisotropy = (mask & FeatureAnisotropy) ? static_cast<uint32_t>(limits.maxSamplerAnisotropy) : 1;
     features.maxUniformSize = limits.maxUniformBufferRange;
     features.maxStorageSize = limits.maxStorageBufferRange;
+    features.maxTexels = limits.maxTexelBufferElements;
+    features.maxSets = limits.maxBoundDescriptorSets;
     features.maxBufferSize = v13.maxBufferSize;
     features.maxTracingInstances = structures.maxInstanceCount;
     features.maxTracingPrimitives = structures.maxPrimitiveCount;

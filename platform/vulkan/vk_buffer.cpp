@@ -20,7 +20,7 @@ VkBufferUsageFlags bufferUsage(Buffer::Flags flags, const FeatureChain& features
     if (flags & Buffer::FlagTexel) {
         usage |= VK_BUFFER_USAGE_UNIFORM_TEXEL_BUFFER_BIT | VK_BUFFER_USAGE_STORAGE_TEXEL_BUFFER_BIT;
     }
-    if (flags & Buffer::FlagScratch) usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
+    if (flags & (Buffer::FlagScratch | Buffer::FlagTracing)) usage |= VK_BUFFER_USAGE_STORAGE_BUFFER_BIT;
     if ((flags & Buffer::FlagTracing) && features.structures.accelerationStructure) {
         usage |= VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR;
     }

@@ -13,7 +13,7 @@ namespace glint::vulkan {
 namespace {
 
 VkDescriptorType descriptorType(const ShaderResource& resource, bool dynamic) {
-    switch (resource.kind) {
+    switch (resource.descriptor) {
         case SlotKind::Uniform:
             return dynamic ? VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER_DYNAMIC : VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
         case SlotKind::Storage: return VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
@@ -45,8 +45,14 @@ LayoutCache::~LayoutCache() {
 
 Expected<PipelineLayout*> LayoutCache::get(const BindingLayout& source) {
     uint32_t uniforms = 0;
+    const auto forEachResource = [&source](auto visit) {
+        for (const auto* resources : {&source.resources, &source.hidden})
+            for (const ShaderResource& resource : *resources) visit(resource, resource.descriptorCount());
+    };
+    forEachResource([&](const ShaderResource& resource, uint32_t count) {
+        if (resource.descriptor == SlotKind::Uniform) uniforms += count;
+    });
     for (const ShaderResource& resource : source.resources) {
-        if (resource.kind == SlotKind::Uniform) uniforms += resource.count;
         if (resource.kind == SlotKind::Table || resource.count == 0) {
             return unexpected(makeError(ErrorCode::Unsupported, "layout.table",
                                         "'{}' is an array of unknown length, which cannot be bound yet",
@@ -66,21 +72,23 @@ Expected<PipelineLayout*> LayoutCache::get(const BindingLayout& source) {
     layout->sets.resize(source.set_count);
     std::vector<std::vector<SetLayout::Binding>> bindings(source.set_count);
     uint32_t uniform = 0;
-    for (const ShaderResource& resource : source.resources) {
+    forEachResource([&](const ShaderResource& resource, uint32_t count) {
         const VkDescriptorType type = descriptorType(resource, layout->dynamic);
-        bindings[resource.set].push_back({resource.binding, resource.count, type, vulkanStages(resource.stages)});
-        const bool is_uniform = resource.kind == SlotKind::Uniform;
+        bindings[resource.set].push_back({resource.binding, count, type, vulkanStages(resource.stages)});
+        const bool is_uniform = resource.descriptor == SlotKind::Uniform;
         PipelineLayout::Set& set = layout->sets[resource.set];
         if (set.element_count == 0) {
             set.first_element = static_cast<uint32_t>(layout->elements.size());
             set.first_uniform = uniform;
         }
-        set.element_count += resource.count;
-        if (is_uniform) set.uniform_count += resource.count;
-        if (is_uniform) uniform += resource.count;
-        layout->elements.insert(layout->elements.end(), resource.count,
-                                {type, resource.dimension, is_uniform, is_uniform ? resource.size : 0});
-    }
+        set.element_count += count;
+        if (is_uniform) set.uniform_count += count;
+        if (is_uniform) uniform += count;
+        // A block of references has no size of its own: the structures' number gives it.
+        const uint32_t size = resource.isRewritten() ? resource.count * 16 : resource.size;
+        layout->elements.insert(layout->elements.end(), count,
+                                {type, resource.dimension, is_uniform, is_uniform ? size : 0});
+    });
 
     const std::lock_guard lock(mutex_);
     for (size_t i = 0; i < layout->sets.size(); i++) {

@@ -116,6 +116,13 @@ VkDescriptorSet Player::writeSet(const PipelineLayout& layout, const PipelineLay
     return written;
 }
 
+VkDescriptorBufferInfo Player::wholeBuffer(const BoundResource& bound) {
+    const uint64_t size = static_cast<const BufferObject*>(list_->resources[bound.resource])->size;
+    // Beyond the end, what comes first stands in: shaders do not go there.
+    const uint64_t offset = bound.offset < size ? bound.offset : 0;
+    return {buffer(bound.resource).handle(), offset, std::min(size - offset, device_.features().maxStorageSize)};
+}
+
 bool Player::writeElement(const LayoutElement& element, const BoundResource& bound, uint64_t uniform_offset,
                           DescriptorData& data) {
     switch (element.type) {
@@ -129,6 +136,7 @@ bool Player::writeElement(const LayoutElement& element, const BoundResource& bou
             return true;
         case VK_DESCRIPTOR_TYPE_STORAGE_BUFFER:
             data.buffer = {buffer(bound.resource).handle(), bound.offset, bound.size};
+            if (bound.size == whole_buffer) data.buffer = wholeBuffer(bound);
             return true;
         case VK_DESCRIPTOR_TYPE_SAMPLER:
             data.image = {static_cast<VulkanSampler*>(list_->resources[bound.resource]->native.get())->handle(),
@@ -139,7 +147,9 @@ bool Player::writeElement(const LayoutElement& element, const BoundResource& bou
             return true;
         case VK_DESCRIPTOR_TYPE_UNIFORM_TEXEL_BUFFER:
         case VK_DESCRIPTOR_TYPE_STORAGE_TEXEL_BUFFER: {
-            Expected<VkBufferView> view = buffer(bound.resource).texels(bound.format, bound.offset, bound.size);
+            Expected<VkBufferView> view =
+                buffer(bound.resource)
+                    .texels(bound.format, bound.offset, bound.size == whole_buffer ? VK_WHOLE_SIZE : bound.size);
             if (!view) {
                 fail(view.error());
                 return false;

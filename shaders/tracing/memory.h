@@ -3,7 +3,7 @@
 //   GLINT_TRACING_TEXELS   a storage texel buffer: the cheapest on lavapipe
 //   GLINT_TRACING_STORAGE  storage buffers of 2^23 texels (128 MiB) each, GLINT_TRACING_BUFFERS of them: in every
 //                          language
-//   GLINT_TRACING_ADDRESS  a buffer address, in GLINT_TRACING_POINTER (a uvec2 that the shader has)
+//   GLINT_TRACING_ADDRESS  a buffer address, in GLINT_TRACING_POINTER (a uvec2 that the shader has), else in a uniform block
 //
 // at GLINT_TRACING_SET and GLINT_TRACING_BINDING. With GLINT_TRACING_WRITE 1 there is GLINT_TRACING_STORE(i, texel), too.
 #pragma once
@@ -70,6 +70,10 @@ void glintStoreTexel(uint i, uvec4 texel) {
 #elif GLINT_TRACING_MEMORY == GLINT_TRACING_ADDRESS
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
+#ifndef GLINT_TRACING_POINTER
+layout(set = GLINT_TRACING_SET, binding = GLINT_TRACING_BINDING) uniform GlintHeap { uvec2 address; } glint_heap;
+#define GLINT_TRACING_POINTER glint_heap.address
+#endif
 layout(buffer_reference, buffer_reference_align = 16) GLINT_TRACING_ACCESS buffer GlintTexels { uvec4 texels[]; };
 #define GLINT_TRACING_LOAD(i) GlintTexels(GLINT_TRACING_POINTER).texels[i]
 #define GLINT_TRACING_STORE(i, texel) GlintTexels(GLINT_TRACING_POINTER).texels[i] = (texel)

@@ -115,13 +115,15 @@ struct CommandHeader {
 };
 
 constexpr uint32_t none = 0xffffffffu;
+/// Size of a binding that reaches to the end of the buffer, or as far as the device can bind, when it is played.
+constexpr uint64_t whole_buffer = ~0ull;
 
 /// One element of a binding block, in the order of BindingLayout::resources, `count` elements each.
 struct BoundResource {
     uint32_t resource = none;       ///< index into CommandList::resources; none for an inline uniform
     uint32_t second = none;         ///< sampler of a combined image and sampler
     uint64_t offset = 0;            ///< bytes into the buffer. Uniforms: 0, theirs is dynamic (below)
-    uint64_t size = 0;              ///< bytes
+    uint64_t size = 0;              ///< bytes, or whole_buffer
     Slice slice;                    ///< textures, resolved
     Format format = FormatUnknown;  ///< texel buffers
 };
@@ -395,6 +397,20 @@ void forEachCommand(const CommandList& list, Visitor&& visit) {
         visit(i, *header);
         position += header->size;
     }
+}
+
+/// Calls f(Stage) for each stage of the tracker that the shader stages run in.
+template <class F>
+void forEachStage(ShaderMask stages, F&& f) {
+    constexpr ShaderMask compute = stageBit(ShaderStage::Compute);
+    constexpr ShaderMask fragment = stageBit(ShaderStage::Fragment);
+    constexpr ShaderMask rays = stageBit(ShaderStage::RayGen) | stageBit(ShaderStage::RayMiss) |
+                                stageBit(ShaderStage::Closest) | stageBit(ShaderStage::FirstHit) |
+                                stageBit(ShaderStage::Intersection) | stageBit(ShaderStage::Callable);
+    if (stages & compute) f(Stage::Compute);
+    if (stages & fragment) f(Stage::Fragment);
+    if (stages & rays) f(Stage::RayTracing);
+    if (stages & ~(compute | fragment | rays)) f(Stage::VertexShader);
 }
 
 /// A transition of one slice of one texture.

@@ -4,6 +4,7 @@
 #include <glint/base/log.h>
 #include <glint/device/detail/backends.h>
 #include <glint/device/detail/recorder_core.h>
+#include <glint/tracing/detail/hierarchy.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -15,6 +16,16 @@ namespace {
 
 /// Scratch memory above this is not kept between builds.
 constexpr uint64_t scratch_limit = 64ull << 20;
+
+/// What a program asks for, else what the environment does.
+Expected<TracingEngine> askedEngine(TracingEngine engine) {
+    const char* name = std::getenv("GLINT_TRACING");
+    if (engine != TracingEngine::Auto || !name || !*name) return engine;
+    for (TracingEngine known : {TracingEngine::Auto, TracingEngine::Driver, TracingEngine::Software})
+        if (std::string_view(name) == toString(known)) return known;
+    return unexpected(makeError(ErrorCode::InvalidArgument, "device.tracing",
+                                "GLINT_TRACING is '{}'; it can be auto, driver or software", name));
+}
 
 bool passed(Backend& backend, const std::array<uint64_t, queue_count>& values) {
     for (size_t q = 0; q < queue_count; q++)
@@ -32,6 +43,7 @@ DeviceObject::~DeviceObject() {
     }
     if (transfers_) recycleRecorder(transfers_);
     scratch_ = {};
+    heap_ = {};
     for (RecorderCore* recorder : recorders_) delete recorder;
     // The device is idle or lost: nothing is in use any more. Deleting one may retire others.
     while (!retired_.empty()) {
@@ -60,20 +72,57 @@ Status DeviceObject::open(const DeviceDesc& desc, Where where) {
     backend_desc.message = [this](const Error& error, bool warning) {
         report(error, warning ? Message::Severity::Warning : Message::Severity::Error);
     };
+    const auto fail = [&](const Error& error) {
+        report(error.at(where));
+        return Status(Object::fail(error.at(where)));
+    };
+    const Expected<TracingEngine> engine = askedEngine(desc.tracing);
+    if (!engine) return fail(engine.error());
+    // What Glint provides itself, no driver has to.
+    constexpr FeatureMask queries = FeatureComputeTracing | FeatureFragmentTracing;
+    if (*engine != TracingEngine::Driver) backend_desc.required &= ~queries;
+    if (*engine == TracingEngine::Software) backend_desc.optional &= ~queries;
     Expected<std::unique_ptr<Backend>> made = createBackend(desc.api, backend_desc);
-    if (!made) {
-        const Error error = made.error().at(where);
-        report(error);
-        return fail(error);
-    }
+    if (!made) return fail(made.error());
     backend = std::move(*made);
+    chooseEngine(*engine, (desc.required | desc.optional) & queries);
     setReady();
     return {};
+}
+
+void DeviceObject::chooseEngine(TracingEngine wanted, FeatureMask queries) {
+    features_ = backend->features();
+    info_ = backend->info();
+    const bool offered = (features_.mask & queries) == queries;
+    TracingEngine engine = wanted;
+    std::string reason = "asked for";
+    if (queries == 0) {
+        engine = TracingEngine::Driver;
+        reason = "no ray queries asked for";
+    } else if (wanted == TracingEngine::Auto) {
+        engine = offered && !info_.cpu ? TracingEngine::Driver : TracingEngine::Software;
+        reason = !offered    ? "the driver offers no ray queries for these stages"
+                 : info_.cpu ? "faster than the driver's on a CPU"
+                             : "the driver's, on a device that is no CPU";
+    }
+    features_.tracingEngine = engine;
+    if (engine == TracingEngine::Software) {
+        features_.mask |= queries;
+        features_.computeTracing = features_.has(FeatureComputeTracing);
+        features_.fragmentTracing = features_.has(FeatureFragmentTracing);
+        features_.maxTracingPrimitives = features_.maxTracingInstances = max_primitives;
+        features_.scratchAlignment = std::max(features_.scratchAlignment, features_.storageAlignment);
+        heap_ = std::make_shared<TracingHeap>(*this);
+    }
+    info_.tracing = fmt::format("{}{} ({})", toString(engine),
+                                heap_ ? fmt::format(", nodes read as {}", toString(heap_->form())) : "", reason);
 }
 
 void DeviceObject::adopt(std::unique_ptr<Backend> made, MessageCallback message) {
     message_ = std::move(message);
     backend = std::move(made);
+    const Expected<TracingEngine> engine = askedEngine(TracingEngine::Auto);
+    chooseEngine(engine ? *engine : TracingEngine::Auto, FeatureComputeTracing | FeatureFragmentTracing);
     setReady();
 }
 
@@ -104,6 +153,22 @@ void DeviceObject::replaceNative(Object& object, std::unique_ptr<Native> made) {
         use = object.last_use;
     }
     if (old) retire(std::move(old), use);
+}
+
+bool DeviceObject::replaceUnused(Object& object, std::unique_ptr<Native>& made,
+                                 const std::array<uint64_t, queue_count>& known) {
+    {
+        std::lock_guard lock(submit_mutex_);
+        if (object.last_use != known) return false;
+        std::swap(object.native, made);
+    }
+    if (made) retire(std::move(made), known);
+    return true;
+}
+
+std::array<uint64_t, queue_count> DeviceObject::lastUse(const Object& object) {
+    std::lock_guard lock(submit_mutex_);
+    return object.last_use;
 }
 
 void DeviceObject::collect() {
@@ -186,11 +251,7 @@ bool DeviceObject::isAwaited(const TextureObject& picture) {
 }
 
 void DeviceObject::waitUnused(const Object& object) {
-    std::array<uint64_t, queue_count> use;
-    {
-        std::lock_guard lock(submit_mutex_);
-        use = object.last_use;
-    }
+    const std::array<uint64_t, queue_count> use = lastUse(object);
     if (!passed(*backend, use)) (void)wait(use, UINT64_MAX, Where::current());
 }
 
@@ -220,10 +281,12 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
         transfers = std::exchange(transfers_, nullptr);
         if (transfers) error = transfers->end(where).error();
         if (transfers && !error && (error = checkPictures(*transfers))) (void)failed(error, where);
+        if (transfers && !error && (error = transfers->placeTracings())) (void)failed(error, where);
         for (RecorderCore* recorder : recorders) {
             const Status ended = recorder->end(where);
             if (!ended && !error) error = ended.error();
             if (!error && (error = checkPictures(*recorder))) error = failed(error, where).error();
+            if (!error && (error = recorder->placeTracings())) error = failed(error, where).error();
             recorder->submitted = true;
         }
         if (error) {
@@ -327,19 +390,24 @@ bool DeviceObject::isLost() {
     return lost_;
 }
 
+Expected<Ref<BufferObject>> DeviceObject::createInternal(const NativeBufferDesc& desc, Where where) {
+    Expected<std::unique_ptr<NativeBuffer>> made = backend->createBuffer(desc);
+    if (!made) return unexpected(made.error().at(where));
+    auto buffer = Ref<BufferObject>::adopt(new BufferObject(this));
+    buffer->size = desc.size;
+    buffer->flags = desc.flags;
+    buffer->native = std::move(*made);
+    buffer->setReady();
+    return buffer;
+}
+
 Expected<Ref<BufferObject>> DeviceObject::createStaging(uint64_t size, bool readback, Where where) {
     NativeBufferDesc desc;
     desc.size = size;
     desc.staging = !readback;
     desc.readback = readback;
     desc.name = readback ? "read-back" : "staging";
-    Expected<std::unique_ptr<NativeBuffer>> made = backend->createBuffer(desc);
-    if (!made) return unexpected(made.error().at(where));
-    auto staging = Ref<BufferObject>::adopt(new BufferObject(this));
-    staging->size = size;
-    staging->native = std::move(*made);
-    staging->setReady();
-    return staging;
+    return createInternal(desc, where);
 }
 
 Expected<Ref<BufferObject>> DeviceObject::acquireScratch(uint64_t size, Where where) {
@@ -349,14 +417,8 @@ Expected<Ref<BufferObject>> DeviceObject::acquireScratch(uint64_t size, Where wh
     desc.size = std::max<uint64_t>(size, 1);
     desc.flags = Buffer::FlagScratch;
     desc.name = "scratch";
-    Expected<std::unique_ptr<NativeBuffer>> made = backend->createBuffer(desc);
-    if (!made) return unexpected(made.error().at(where));
-    auto scratch = Ref<BufferObject>::adopt(new BufferObject(this));
-    scratch->size = desc.size;
-    scratch->flags = Buffer::FlagScratch;
-    scratch->native = std::move(*made);
-    scratch->setReady();
-    if (size <= scratch_limit) scratch_ = scratch;
+    Expected<Ref<BufferObject>> scratch = createInternal(desc, where);
+    if (scratch && size <= scratch_limit) scratch_ = *scratch;
     return scratch;
 }
 

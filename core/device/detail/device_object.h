@@ -4,6 +4,7 @@
 
 #include <glint/device/detail/backend.h>
 #include <glint/device/detail/object.h>
+#include <glint/device/detail/tracing_heap.h>
 #include <glint/device/detail/tracker.h>
 #include <glint/device/device.h>
 
@@ -14,6 +15,7 @@
 
 namespace glint::detail {
 
+struct Hierarchy;
 class RecorderCore;
 
 class DeviceObject final : public Object {
@@ -27,8 +29,10 @@ public:
     /// Takes a back end that exists already: foreign handles.
     void adopt(std::unique_ptr<Backend> made, MessageCallback message);
 
-    const Features& features() const { return backend->features(); }
-    const DeviceInfo& info() const { return backend->info(); }
+    const Features& features() const { return features_; }
+    const DeviceInfo& info() const { return info_; }
+    /// The heap of the software engine, null if the driver answers ray queries.
+    TracingHeap* heap() const { return heap_.get(); }
 
     /// Tells the message callback.
     void report(const Error& error, Message::Severity severity = Message::Severity::Error) const;
@@ -37,6 +41,11 @@ public:
     void retire(std::unique_ptr<Native> native, const std::array<uint64_t, queue_count>& last_use);
     /// Gives an object another native one between submissions; the old one is retired.
     void replaceNative(Object& object, std::unique_ptr<Native> native);
+    /// The same if nothing but those submissions has used it; else false, and nothing happens.
+    /// Software engine: the structure lies elsewhere from the submission on that is being made. Under the submit lock.
+    void moveTracing(TracingObject& tracing, TracingHeap::Range range);
+    bool replaceUnused(Object& object, std::unique_ptr<Native>& native, const std::array<uint64_t, queue_count>& known);
+    std::array<uint64_t, queue_count> lastUse(const Object& object);
     /// Deletes what the GPU has passed.
     void collect();
 
@@ -69,8 +78,19 @@ public:
     Status wait(const std::array<uint64_t, queue_count>& values, uint64_t nanoseconds, Where where);
     bool isDone(const std::array<uint64_t, queue_count>& values);
     bool isLost();
+    /// Records, plays and waits.
+    template <class Record>
+    Status playNow(std::string_view name, Where where, Record&& record) {
+        const RecorderPtr core = acquireRecorder(Queue::Main, name);
+        record(*core);
+        const Ref<FenceObject> fence = Ref<FenceObject>::adopt(new FenceObject(this));
+        RecorderCore* const recorders[] = {core.get()};
+        if (Status status = submit(recorders, fence.get(), where); !status) return status;
+        return wait(fence->values, UINT64_MAX, where);
+    }
 
     /// Host-visible memory for an upload or a read-back; kept alive by the list that uses it.
+    Expected<Ref<BufferObject>> createInternal(const NativeBufferDesc& desc, Where where);
     Expected<Ref<BufferObject>> createStaging(uint64_t size, bool readback, Where where);
 
     /// Scratch memory shared by the builds that bring none: one buffer, which grows. Builds with it run one after
@@ -80,6 +100,9 @@ public:
     /// Plays what `core` holds, then puts compacted copies in the place of the structures. `core` is a fresh one
     /// afterwards.
     Status compact(RecorderPtr& core, std::span<TracingObject* const> tracings, Where where);
+    /// Software engine: builds on the CPU's cores and waits for what the geometry depends on. Errors: those of
+    /// buildHierarchy, "tracing.heap", "device.out_of_memory".
+    Status buildOnHost(std::span<TracingObject* const> tracings, Where where);
     /// Waits for the query's last submission. Errors: "query.unused".
     Expected<std::array<uint64_t, 7>> queryResult(QueryObject& query, Where where);
 
@@ -91,12 +114,18 @@ private:
         std::array<uint64_t, queue_count> last_use;
     };
 
+    /// Decides who answers ray queries; `queries` are the features of them that were asked for.
+    void chooseEngine(TracingEngine wanted, FeatureMask queries);
+    Status upload(TracingObject& tracing, const Hierarchy& hierarchy, Where where);
     RecorderCore* takeRecorder(Queue queue, std::string_view name);
     Error checkPictures(const RecorderCore& recorder) const;
     Status play(Queue queue, Where where, NativeWindow* presented);
     Status failed(Error error, Where where);
 
     MessageCallback message_;
+    Features features_;
+    DeviceInfo info_;
+    std::shared_ptr<TracingHeap> heap_;
 
     std::mutex submit_mutex_;  // of tracker_, next_value_, scratch below, last_use of objects
     Tracker tracker_;

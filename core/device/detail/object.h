@@ -146,6 +146,7 @@ public:
 
     uint64_t size = 0;
     Buffer::Flags flags = 0;
+    bool is_heap = false;  ///< a TracingHeap's: what its ranges hold is tracked by structure
     ResourceState use;
 };
 
@@ -222,7 +223,8 @@ public:
     std::array<std::vector<ShaderMask>, static_cast<size_t>(SlotKind::Count)> masks;
     BindingLayout layout;
     /// Where element 0 of BindingLayout::resources[i] stands in a binding block.
-    std::vector<uint32_t> first_element;
+    std::vector<uint32_t> first_element;  ///< hidden ones follow
+    std::vector<uint32_t> first_uniform;  ///< likewise, among the uniform elements
     uint32_t element_count = 0;
     uint32_t uniform_elements = 0;
 
@@ -237,6 +239,9 @@ private:
     void lastRelease() override;
     Status build(Where where);
     Expected<BindingLayout> mergeStages(const Stages& stages, Where where) const;
+    /// The shaders as the device's engine plays them: with ray queries in software they are compiled anew.
+    Expected<std::vector<Ref<ShaderObject>>> forEngine(const std::vector<Ref<ShaderObject>>& compiled,
+                                                       Where where) const;
     Expected<Stages> specialize(std::vector<Ref<ShaderObject>> compiled, Where where) const;
     Error checkFeatures(const Reflection& stage, Where where) const;
     Error checkResource(const ShaderResource& resource, Where where) const;
@@ -302,6 +307,10 @@ public:
     Ref<BufferObject> instance_buffer;  ///< native records, written when it is built: compaction moves structures
     bool built = false;                 ///< a build has been recorded
     bool compacted = false;
+    /// Software engine: how often the hierarchy has been put elsewhere, and for a top level the sum of its references'
+    /// numbers when it was built. Guarded by the submit lock.
+    uint64_t moves = 0;
+    uint64_t built_moves = 0;
     ResourceState use;
 };
 

@@ -8,20 +8,6 @@ namespace glint::detail {
 
 namespace {
 
-/// Calls f(Stage) for each stage of the tracker that the shader stages run in.
-template <class F>
-void forEachStage(ShaderMask stages, F&& f) {
-    constexpr ShaderMask compute = stageBit(ShaderStage::Compute);
-    constexpr ShaderMask fragment = stageBit(ShaderStage::Fragment);
-    constexpr ShaderMask rays = stageBit(ShaderStage::RayGen) | stageBit(ShaderStage::RayMiss) |
-                                stageBit(ShaderStage::Closest) | stageBit(ShaderStage::FirstHit) |
-                                stageBit(ShaderStage::Intersection) | stageBit(ShaderStage::Callable);
-    if (stages & compute) f(Stage::Compute);
-    if (stages & fragment) f(Stage::Fragment);
-    if (stages & rays) f(Stage::RayTracing);
-    if (stages & ~(compute | fragment | rays)) f(Stage::VertexShader);
-}
-
 bool overlap(const Slice& a, const Slice& b) {
     return a.mip < b.mip + b.mips && b.mip < a.mip + a.mips && a.layer < b.layer + b.layers &&
            b.layer < a.layer + a.layers;
@@ -316,21 +302,26 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
     Bound unset;
     for (size_t k = 0; k < layout.slots.size(); k++) {
         const auto kind = static_cast<SlotKind>(k);
-        if (!bindings_dirty_ && kind != SlotKind::Uniform) continue;
-        uint32_t uniform = 0;
+        if (!bindings_dirty_ && kind != SlotKind::Uniform && kind != SlotKind::Tracing) continue;
         for (uint32_t slot = 0; slot < layout.slots[k].size(); slot++) {
             const uint32_t index = layout.slots[k][slot];
             const ShaderResource& resource = layout.resources[index];
             auto& slots = bound_[k];
             if (slot >= slots.size()) slots.resize(layout.slots[k].size());
+            const bool in_software = resource.isRewritten();
+            if (kind == SlotKind::Tracing && !bindings_dirty_ && !in_software) continue;
             for (uint32_t e = 0; e < resource.count; e++) {
                 Bound& bound = resource.count == 1               ? slots[slot]
                                : e < slots[slot].elements.size() ? slots[slot].elements[e]
                                                                  : unset;
                 if (bindings_dirty_ && !checkBound(resource, kind, slot, bound, what, where)) return false;
-                if (kind == SlotKind::Uniform && offsets)
-                    offsets[uniform++] = static_cast<uint32_t>(bound.value.offset);
+                if (kind == SlotKind::Uniform)
+                    offsets[program_->first_uniform[index] + e] = static_cast<uint32_t>(bound.value.offset);
                 if (!bindings_dirty_) continue;
+                if (in_software) {
+                    accessBound(resource, kind, bound);
+                    continue;
+                }
                 BoundResource& element = elements[program_->first_element[index] + e];
                 if (kind == SlotKind::Sampler && resource.combined) {
                     element.second = bound.value.resource;
@@ -345,8 +336,16 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
                 }
                 accessBound(resource, kind, bound);
             }
+            if (!in_software) continue;
+            if (bindings_dirty_) {
+                BoundResource& block = elements[program_->first_element[index]];
+                block = {};
+                block.size = bindReferences(resource, slots[slot]);
+            }
+            offsets[program_->first_uniform[index]] = slots[slot].references;
         }
     }
+    bindHidden(elements, offsets);
 
     if (bindings_dirty_) {
         for (const Use& buffer : uses_)

@@ -112,21 +112,30 @@ void RecorderCore::copyBuffer(const Buffer& destination, uint64_t destination_of
         return fail(where, ErrorCode::InvalidArgument, "copy.overlap",
                     "copyBuffer: {} bytes at {} and at {} of {} overlap", size, source_offset, destination_offset,
                     to->label());
-    const uint32_t to_resource = use(*to);
-    const uint32_t from_resource = use(*from);
+    copyBuffer(*to, destination_offset, *from, source_offset, size);
+}
+
+CopyBufferCommand& RecorderCore::copyBuffer(BufferObject& to, uint64_t to_offset, BufferObject& from,
+                                            uint64_t from_offset, uint64_t size, TracingObject* tracing) {
+    const uint32_t to_resource = use(to);
+    const uint32_t from_resource = use(from);
+    const uint32_t structure = tracing ? use(*tracing) : none;
     beginAccesses();
-    if (to == from) {
+    if (&to == &from) {
         access(to_resource, Stage::Copy, AccessRead | AccessWrite);
     } else {
-        access(from_resource, Stage::Copy, AccessRead);
-        access(to_resource, Stage::Copy, AccessWrite);
+        // The whole heap is read once all that is being written to its ranges is there.
+        access(from_resource, Stage::Copy, static_cast<uint8_t>(from.is_heap ? AccessRead | AccessWrite : AccessRead));
+        access(to_resource, Stage::Copy, tracing ? AccessRead : AccessWrite);
     }
+    if (tracing) access(structure, Stage::Copy, AccessWrite);
     auto& command = push<CopyBufferCommand>(CommandType::CopyBuffer);
     command.source = from_resource;
     command.destination = to_resource;
-    command.source_offset = source_offset;
-    command.destination_offset = destination_offset;
+    command.source_offset = from_offset;
+    command.destination_offset = to_offset;
     command.size = size;
+    return command;
 }
 
 void RecorderCore::clearBuffer(const Buffer& buffer, uint32_t value, uint64_t offset, uint64_t size, Where where) {

@@ -54,6 +54,9 @@ void RecorderCore::clear() {
             bound.elements.clear();
         }
     uses_.clear();
+    placements_.clear();
+    moves_.clear();
+    heap_block_ = none;
     open_queries_.clear();
     target_ = {};
 }
@@ -62,6 +65,10 @@ void RecorderCore::fail(const Error& error) {
     if (list_.error) return;
     list_.error = error;
     device_->report(error);
+}
+
+void RecorderCore::keepError(const Error& error) {
+    if (!list_.error) list_.error = error;
 }
 
 bool RecorderCore::recording(Where where) {

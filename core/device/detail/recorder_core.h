@@ -17,6 +17,8 @@
 
 namespace glint::detail {
 
+struct BuildPass;
+
 class RecorderCore {
 public:
     using Where = std::source_location;
@@ -39,6 +41,9 @@ public:
     /// The list has been handed to the GPU: the structures that it builds are built. Those of a list that is cleared
     /// without this count as unbuilt again.
     void confirmBuilds() { first_builds_.clear(); }
+    /// Software engine: writes into the list where structures lie now. Under the submit lock, before the list is
+    /// played. Errors: "tracing.moved".
+    Error placeTracings();
     /// Keeps the device alive while a user holds the recorder; empty while it rests in the pool.
     Ref<DeviceObject> keep;
 
@@ -65,6 +70,9 @@ public:
     void setBufferData(const Buffer& buffer, uint64_t offset, const void* data, uint64_t size, Where where);
     void copyBuffer(const Buffer& destination, uint64_t destination_offset, const Buffer& source,
                     uint64_t source_offset, uint64_t size, Where where);
+    /// Checked by the caller. With a structure, it is what is written, within the heap.
+    CopyBufferCommand& copyBuffer(BufferObject& to, uint64_t to_offset, BufferObject& from, uint64_t from_offset,
+                                  uint64_t size, TracingObject* tracing = nullptr);
     void clearBuffer(const Buffer& buffer, uint32_t value, uint64_t offset, uint64_t size, Where where);
     void setTextureData(const Texture& texture, const void* data, uint64_t size, Slice slice, Region region,
                         Where where);
@@ -104,6 +112,8 @@ public:
 
     /// Keeps the first error and reports it.
     void fail(const Error& error);
+    /// The same for an error that has been told already.
+    void keepError(const Error& error);
     /// False, and the error is kept, if the list takes no more or the handle cannot be used.
     bool check(const Handle& handle, const char* what, Where where) {
         return recording(where) && usable(handle, what, where);
@@ -115,6 +125,7 @@ private:
         bool set = false;
         bool inlined = false;  ///< inline uniform: offset is into the inline data
         BoundResource value;
+        uint32_t references = 0;      ///< tracing in software: its block in the inline data
         std::vector<Bound> elements;  ///< of an array slot, element 0 included; empty otherwise
     };
     struct VertexSource {
@@ -122,6 +133,21 @@ private:
         uint64_t offset = 0;
         uint64_t size = 0;  ///< bytes from offset
         bool set = false;
+    };
+    /// What is known of the software engine's structures when the list is played, at a place in the inline data.
+    struct Placement {
+        enum class Kind : uint8_t {
+            Instance,   ///< texel of a structure, in an instance
+            Reference,  ///< texel of a top level, in a shader's block of references
+            Built,      ///< a top level has been built from its references
+            Heap,       ///< the heap's address
+            Address,    ///< the same in CommandList::bytes
+            Hierarchy,  ///< texel of a structure in CommandList::bytes
+            Move,       ///< a structure gets the range moves_[place]
+        };
+        Kind kind = Kind::Instance;
+        uint32_t place = 0;
+        uint32_t resource = 0;
     };
     struct Use {
         uint32_t resource;
@@ -177,6 +203,19 @@ private:
     }
 
     void writeInstances(TracingObject& tracing);
+    void buildInSoftware(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
+                         BufferObject& scratch, bool update, Where where);
+    bool buildInstancesOnHost(TracingObject& tracing, Where where);
+    bool buildOnDevice(TracingObject& tracing, BufferObject& scratch, uint64_t scratch_offset, bool update,
+                       Where where);
+    bool writeDeviceInstances(TracingObject& tracing, Where where);
+    bool playPass(const BuildPass& pass, uint64_t scratch_size, TracingObject& tracing, BufferObject& scratch,
+                  uint64_t scratch_offset, Where where);
+    void copyInline(BufferObject& buffer, uint64_t offset, uint32_t place, uint64_t size);
+    bool checkReferences(const TracingObject& tracing, Where where);
+    void confirmBuild(TracingObject& tracing);
+    uint64_t bindReferences(const ShaderResource& resource, Bound& bound);
+    void bindHidden(std::span<BoundResource> elements, uint32_t* offsets);
     Bound* bind(SlotKind kind, const Slot& slot, uint32_t step);
     void setProgram(ProgramObject& program);
     bool flushBindings(const char* what, Where where);
@@ -230,6 +269,11 @@ private:
     std::vector<Query> open_queries_;
     std::vector<TracingObject*>
         first_builds_;  ///< what no earlier list has built from the same; the list keeps them alive
+
+    std::vector<Placement> placements_;
+    std::vector<TracingHeap::Range> moves_;
+    std::vector<BoundResource> pass_elements_;
+    uint32_t heap_block_ = none;  ///< inline data: the heap's address
 
     // Scratch of one call, kept for its capacity.
     std::vector<const NativeTracing*> natives_;

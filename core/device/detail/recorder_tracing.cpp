@@ -125,6 +125,7 @@ void RecorderCore::buildTracing(const Tracing& tracing, const Buffer& scratch, u
 void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                                  BufferObject& scratch, bool update, Where where) {
     if (!recording(where)) return;
+    if (device_->heap()) return buildInSoftware(tracings, offsets, scratch, update, where);
     const uint32_t scratch_resource = use(scratch);
     for (TracingObject* tracing : tracings)
         if (tracing->tracing_type == Tracing::TypeInstance) writeInstances(*tracing);
@@ -141,24 +142,14 @@ void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::
         access(build.tracing, Stage::Build, static_cast<uint8_t>(update ? AccessRead | AccessWrite : AccessWrite));
         for (const Ref<BufferObject>& buffer : tracing.buffers) access(use(*buffer), Stage::Build, AccessRead);
         if (tracing.tracing_type == Tracing::TypeInstance) {
-            for (const Ref<TracingObject>& reference : tracing.references) {
-                if (!reference->built)
-                    return fail(where, ErrorCode::InvalidArgument, "tracing.unbuilt",
-                                "buildTracing: {} refers to {}, which has not been built", tracing.label(),
-                                reference->label());
+            if (!checkReferences(tracing, where)) return;
+            for (const Ref<TracingObject>& reference : tracing.references)
                 access(use(*reference), Stage::Build, AccessRead);
-            }
             build.instances = use(*tracing.instance_buffer);
             build.instance_count = static_cast<uint32_t>(tracing.instance_data.size());
             access(build.instances, Stage::Build, AccessRead);
         }
-        const bool same =
-            std::equal(tracing.references.begin(), tracing.references.end(), tracing.built_references.begin(),
-                       tracing.built_references.end(),
-                       [](const Ref<TracingObject>& a, const Ref<TracingObject>& b) { return a.get() == b.get(); });
-        if (!same) tracing.built_references = tracing.references;
-        if (!tracing.built || !same) first_builds_.push_back(&tracing);
-        tracing.built = true;
+        confirmBuild(tracing);
         builds_.push_back(build);
     }
     const uint32_t place = append(builds_.data(), builds_.size() * sizeof(TracingBuild));
@@ -167,6 +158,26 @@ void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::
     command.header.untracked = false;
     command.builds = place;
     command.count = static_cast<uint32_t>(builds_.size());
+}
+
+bool RecorderCore::checkReferences(const TracingObject& tracing, Where where) {
+    for (const Ref<TracingObject>& reference : tracing.references)
+        if (!reference->built) {
+            fail(where, ErrorCode::InvalidArgument, "tracing.unbuilt",
+                 "buildTracing: {} refers to {}, which has not been built", tracing.label(), reference->label());
+            return false;
+        }
+    return true;
+}
+
+void RecorderCore::confirmBuild(TracingObject& tracing) {
+    const bool same =
+        std::equal(tracing.references.begin(), tracing.references.end(), tracing.built_references.begin(),
+                   tracing.built_references.end(),
+                   [](const Ref<TracingObject>& a, const Ref<TracingObject>& b) { return a.get() == b.get(); });
+    if (!same) tracing.built_references = tracing.references;
+    if (!tracing.built || !same) first_builds_.push_back(&tracing);
+    tracing.built = true;
 }
 
 void RecorderCore::copyTracing(TracingObject& destination, TracingObject& source, bool compact) {

@@ -16,7 +16,7 @@ namespace glint {
 /// By whom a shader's ray queries are answered: by the driver, or by a traversal library of Glint's own, for which the
 /// module is rewritten (docs/shaders.md, "Ray queries in software").
 struct TracingRewrite {
-    std::string library;  ///< the library, as #include finds it ("glint/tracing/plain.h"); empty: the driver
+    std::string library;  ///< the library, as #include finds it ("glint/tracing/query.h"); empty: the driver
     std::string macros;   ///< for the library alone, such as the form its nodes are read in
     uint32_t set = 7;  ///< the library's own descriptor set, above those of the shader; the same for a program's stages
 };

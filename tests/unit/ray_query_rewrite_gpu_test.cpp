@@ -2,6 +2,7 @@
 // about the same random scenes.
 
 #include "conformance/conformance.h"
+#include "support/plain_library.h"
 #include "support/reference.h"
 
 #include <glint/geometry/primitives.h>
@@ -347,7 +348,7 @@ protected:
     /// The rewritten shader as the SPIR-V that it now is: the references are an ordinary block. Not optimised yet, so
     /// that what it declares and does not use keeps its slot.
     static Shader softwareShader(const std::string& text, ShaderStage stage, Shader::Type type,
-                                 const char* library = "glint/tracing/plain.h") {
+                                 const char* library = plainLibrary()) {
         ShaderSource source;
         source.stage = stage;
         source.text = text;
@@ -365,7 +366,7 @@ protected:
         return rewritten ? Shader::createSPIRV(type, *rewritten, "rewritten") : Shader();
     }
 
-    Kernel softwareKernel(const std::string& text, const char* library = "glint/tracing/plain.h") {
+    Kernel softwareKernel(const std::string& text, const char* library = plainLibrary()) {
         Kernel kernel = device.createKernel("software");
         kernel.setShader(softwareShader(text, ShaderStage::Compute, Shader::TypeCompute, library));
         EXPECT_THAT(kernel.create(), IsOk());

@@ -3,6 +3,8 @@
 
 #include "shader_test.h"
 
+#include "support/plain_library.h"
+
 #include <glint/shader/convert.h>
 
 #include <spirv/unified1/spirv.hpp>
@@ -14,10 +16,8 @@ namespace glint::test {
 
 namespace {
 
-constexpr const char* library = "glint/tracing/plain.h";
-
 ShaderSource rewritten(ShaderSource source) {
-    source.tracing.library = library;
+    source.tracing.library = plainLibrary();
     return source;
 }
 

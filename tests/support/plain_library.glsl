@@ -88,8 +88,7 @@ void glintQueryInitialize(inout GlintQuery query, const uint number, const uint 
     query.instances = glint_words[top];
     query.instance = ~0u;  // none yet
     query.geometry = query.geometries = query.primitive = query.primitives = 0u;
-    query.committed = query.candidate =
-        GlintHit(GLINT_COMMITTED_NONE, 0, 0, 0, tmax, vec2(0.0), false);
+    query.committed = query.candidate = GlintHit(GLINT_COMMITTED_NONE, 0, 0, 0, tmax, vec2(0.0), false);
     // NaN: such a ray hits nothing.
     if (!(tmin <= tmax)) query.instances = 0u;
 }
@@ -103,8 +102,7 @@ void glintQueryTerminate(inout GlintQuery query) {
 void glintQueryConfirm(inout GlintQuery query) {
     query.committed = query.candidate;
     query.committed.type = GLINT_COMMITTED_TRIANGLE;
-    if ((query.flags & GLINT_RAY_TERMINATE) != 0u)
-        query.instances = query.geometries = query.primitives = 0u;
+    if ((query.flags & GLINT_RAY_TERMINATE) != 0u) query.instances = query.geometries = query.primitives = 0u;
 }
 
 void glintQueryGenerate(inout GlintQuery query, const float t) {
@@ -112,8 +110,7 @@ void glintQueryGenerate(inout GlintQuery query, const float t) {
     query.committed = query.candidate;
     query.committed.type = GLINT_COMMITTED_GENERATED;
     query.committed.t = t;
-    if ((query.flags & GLINT_RAY_TERMINATE) != 0u)
-        query.instances = query.geometries = query.primitives = 0u;
+    if ((query.flags & GLINT_RAY_TERMINATE) != 0u) query.instances = query.geometries = query.primitives = 0u;
 }
 
 bool glintQueryProceed(inout GlintQuery query) {
@@ -212,8 +209,7 @@ int glintQueryInstanceCustomIndex(inout GlintQuery query, const bool committed) 
     int instance = committed ? query.committed.instance : query.candidate.instance;
     return int(glint_words[glintInstanceWord(query.top, instance) + 24u] & 0xffffffu);
 }
-uint glintQueryInstanceOffset(inout GlintQuery query,
-                                                                        const bool committed) {
+uint glintQueryInstanceOffset(inout GlintQuery query, const bool committed) {
     int instance = committed ? query.committed.instance : query.candidate.instance;
     return glint_words[glintInstanceWord(query.top, instance) + 25u] & 0xffffffu;
 }

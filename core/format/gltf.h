@@ -40,9 +40,8 @@ struct GltfOptions {
 ///   warning "gltf.attribute_dropped".
 /// - Triangle strips and fans become triangles, with the winding that the specification gives them; primitives without
 ///   indices get them; points and lines are left out with the warning "gltf.primitive_dropped".
-/// - Normals and tangents are brought to unit length ((0, 0, 1) and (1, 0, 0) if they have none), weights of joints to
-/// a
-///   sum of 1 (all on the first joint if they are 0).
+/// - Normals and tangents are brought to unit length ((0, 0, 1) and (1, 0, 0) if they have none), weights of joints
+///   to a sum of 1 (all on the first joint if they are 0).
 /// - One scene is read: the document's default one, else the first, else all nodes without a parent.
 ///
 /// Every error names the document and the element: "nodes[3].children[1]". Errors:
@@ -54,7 +53,8 @@ struct GltfOptions {
 /// - meshes: "gltf.count" (attributes, targets or indices that do not fit each other), "gltf.vertex_index",
 ///   "gltf.joint";
 /// - nodes and animations: "gltf.two_parents", "gltf.cycle", "gltf.root", "gltf.key_order", "gltf.channel";
-/// - images: "gltf.image_format" (neither PNG nor JPEG), "image.png_malformed", "image.jpeg_malformed".
+/// - images: "gltf.image_format" (neither PNG nor JPEG), "image.png_malformed", "image.jpeg_malformed",
+///   "image.jpeg_unsupported".
 Expected<Scene> parseGltf(std::span<const std::byte> bytes, const GltfOptions& options = {});
 
 }  // namespace glint

@@ -99,17 +99,21 @@ std::string extension(const std::filesystem::path& path) {
 struct FileFormat {
     std::string_view extension;
     Expected<Image> (*decode)(std::span<const std::byte>, uint64_t limit);
-    Expected<std::vector<std::byte>> (*encode)(const Image&);
+    Expected<std::vector<std::byte>> (*encode)(const Image&);  // null: not written
 };
-constexpr FileFormat file_formats[] = {
-    {".png", decodePng, encodePng}, {".hdr", decodeHdr, encodeHdr}, {".exr", decodeExr, encodeExr}};
+constexpr FileFormat file_formats[] = {{".png", decodePng, encodePng},
+                                       {".jpg", decodeJpeg, nullptr},
+                                       {".jpeg", decodeJpeg, nullptr},
+                                       {".hdr", decodeHdr, encodeHdr},
+                                       {".exr", decodeExr, encodeExr}};
 
-Expected<FileFormat> fileFormat(const std::filesystem::path& path) {
+Expected<FileFormat> fileFormat(const std::filesystem::path& path, bool is_written) {
     const std::string ending = extension(path);
     for (const FileFormat& format : file_formats)
-        if (format.extension == ending) return format;
+        if (format.extension == ending && (format.encode || !is_written)) return format;
     return unexpected(makeError(ErrorCode::Unsupported, "image.unknown_extension",
-                                "'{}': images end in .png, .hdr or .exr, not in '{}'", path.string(),
+                                "'{}': images that are {} end in {}.hdr or .exr, not in '{}'", path.string(),
+                                is_written ? "written" : "read", is_written ? ".png, " : ".png, .jpg, .jpeg, ",
                                 path.extension().string()));
 }
 
@@ -150,7 +154,7 @@ Expected<Image> Image::create(Format format, uint32_t width, uint32_t height, st
 }
 
 Expected<Image> Image::load(const std::filesystem::path& path, uint64_t limit) {
-    const Expected<FileFormat> format = fileFormat(path);
+    const Expected<FileFormat> format = fileFormat(path, false);
     if (!format) return unexpected(format.error());
     Expected<std::vector<std::byte>> bytes = readFile(path, limit);
     if (!bytes) return unexpected(bytes.error());
@@ -162,7 +166,7 @@ Expected<Image> Image::load(const std::filesystem::path& path, uint64_t limit) {
 }
 
 Status Image::save(const std::filesystem::path& path) const {
-    const Expected<FileFormat> format = fileFormat(path);
+    const Expected<FileFormat> format = fileFormat(path, true);
     if (!format) return format.error();
     Expected<std::vector<std::byte>> bytes = format->encode(*this);
     if (!bytes) return bytes.error();

@@ -29,9 +29,9 @@ public:
     /// An image of the given texels. Errors: those above and "image.data_size" (not width * height texels).
     static Expected<Image> create(Format format, uint32_t width, uint32_t height, std::span<const std::byte> data);
 
-    /// Reads a file; its ending says which format it has (".png", ".hdr", ".exr"; see decodePng, decodeHdr, decodeExr).
-    /// `limit` bounds the bytes of the file and of the image. Errors: those of readFile, "image.unknown_extension" and
-    /// those of the format, which name the file.
+    /// Reads a file; its ending says which format it has (".png", ".jpg" or ".jpeg", ".hdr", ".exr"; see decodePng,
+    /// decodeJpeg, decodeHdr, decodeExr). `limit` bounds the bytes of the file and of the image. Errors: those of
+    /// readFile, "image.unknown_extension" and those of the format, which name the file.
     static Expected<Image> load(const std::filesystem::path& path, uint64_t limit = default_limit);
 
     /// Writes a file, as its ending says (".png", ".hdr", ".exr"; see encodePng, encodeHdr, encodeExr). Errors: those
@@ -83,7 +83,8 @@ Expected<Image> decodePng(std::span<const std::byte> bytes, uint64_t limit = Ima
 /// Reads a JPEG file's bytes with libjpeg-turbo, baseline or progressive: FormatRu8n for one channel, RGBAu8n for
 /// three. Values are those stored: no colour profile is applied, and no orientation of the camera. A file that ends
 /// early is a picture with gray in it. The image may take `limit` bytes, and the reader four times as much beside it.
-/// Errors: "image.jpeg_malformed", "image.too_large".
+/// Errors: "image.jpeg_malformed"; "image.jpeg_unsupported" (the colours of printers, CMYK and YCCK);
+/// "image.too_large".
 Expected<Image> decodeJpeg(std::span<const std::byte> bytes, uint64_t limit = Image::default_limit);
 
 /// Makes a PNG file's bytes. For FormatRu8n, RGu8n, RGBAu8n, RGBAu8ns, BGRAu8n, BGRAu8ns, Ru16n, RGu16n and RGBAu16n;

@@ -54,6 +54,7 @@ struct Benchmark {
 };
 
 // One for each source of this folder.
+Benchmark shaderCompileBenchmark();
 Benchmark dispatchBenchmark();
 Benchmark drawBenchmark();
 Benchmark warmFrameBenchmark();

@@ -1,7 +1,7 @@
 // Hits of the driver, and of Embree, against float64. What is compared and by which bounds: support/hit_accuracy.h.
 
+#include "accuracy/caster_test.h"
 #include "accuracy/embree.h"
-#include "support/device_fixture.h"
 #include "support/files.h"
 #include "support/hit_accuracy.h"
 
@@ -16,22 +16,8 @@ namespace glint::test {
 
 namespace {
 
-class HitAccuracy : public DeviceTest {
+class HitAccuracy : public CasterTest {
 protected:
-    void SetUp() override {
-        DeviceTest::SetUp();
-        GLINT_NEED_FEATURE(FeatureComputeTracing);
-    }
-
-    std::vector<RayHit> cast(const Mesh& mesh, const std::vector<Ray>& rays) {
-        Expected<RayCaster> caster = RayCaster::create(device, mesh);
-        EXPECT_THAT(caster, IsOk());
-        if (!caster) return {};
-        const Expected<std::vector<RayHit>> hits = caster->cast(rays);
-        EXPECT_THAT(hits, IsOk());
-        return hits ? *hits : std::vector<RayHit>();
-    }
-
     /// Casts and judges. At least `share` of the rays hit.
     HitComparison expectRight(const Mesh& mesh, const std::vector<Ray>& rays, double share = 0.25) {
         const HitComparison result = compareHits(ReferenceHierarchy(mesh), rays, cast(mesh, rays));

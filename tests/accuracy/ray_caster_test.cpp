@@ -1,7 +1,6 @@
 // What RayCaster promises beside exact hits: rays that mean nothing, ranges, parts, chunks, errors.
 
-#include "support/device_fixture.h"
-#include "support/hit_accuracy.h"
+#include "accuracy/caster_test.h"
 
 #include <glint/geometry/primitives.h>
 
@@ -18,27 +17,7 @@ namespace {
 
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
-class RayCasterTest : public DeviceTest {
-protected:
-    void SetUp() override {
-        DeviceTest::SetUp();
-        GLINT_NEED_FEATURE(FeatureComputeTracing);
-    }
-
-    std::vector<RayHit> cast(const Mesh& mesh, const std::vector<Ray>& rays) {
-        Expected<RayCaster> caster = RayCaster::create(device, mesh);
-        EXPECT_THAT(caster, IsOk());
-        if (!caster) return {};
-        const Expected<std::vector<RayHit>> hits = caster->cast(rays);
-        const Expected<std::vector<uint8_t>> any = caster->castAny(rays);
-        EXPECT_THAT(hits, IsOk());
-        EXPECT_THAT(any, IsOk());
-        if (!hits || !any) return {};
-        EXPECT_EQ(any->size(), hits->size());
-        for (size_t i = 0; i < rays.size(); i++) EXPECT_EQ((*any)[i], (*hits)[i].isHit() ? 1 : 0) << "ray " << i;
-        return *hits;
-    }
-};
+using RayCasterTest = CasterTest;
 
 /// A square of two triangles at z = 0, counter-clockwise seen from above.
 Mesh square() { return createPlane(2.0f); }

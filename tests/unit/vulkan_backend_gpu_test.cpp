@@ -217,6 +217,8 @@ protected:
         EXPECT_GE(backend->completed(Queue::Main), value);
     }
 
+    struct SplitPass;
+
     std::unique_ptr<Backend> backend;
     uint64_t value = 0;
     std::vector<Error> messages;
@@ -261,11 +263,23 @@ std::vector<BoundResource> addBindings(List& list, const Ref<BufferObject>& valu
     return {uniform, storage};
 }
 
-/// A pass with two draws into four samples, split between them, resolved at its end.
-struct SplitPass {
+/// A pass with two draws into four samples, split between them, resolved at its end; and what it needs.
+struct VulkanBackendTest::SplitPass {
+    static constexpr uint32_t size = 8, samples = 4;
+    Ref<PipelineObject> pipeline;
+    Ref<TextureObject> color, resolve;
+    Ref<BufferObject> pixels;
+    Ref<QueryObject> query;  ///< counts samples
     List list;
-    SplitPass(const Ref<PipelineObject>& pipeline, const Ref<TextureObject>& color, const Ref<TextureObject>& resolve,
-              const Ref<QueryObject>& query, const Ref<BufferObject>& pixels, uint32_t size) {
+
+    explicit SplitPass(VulkanBackendTest& test)
+        : pipeline(test.makePipeline(samples)),
+          color(test.makeTexture(size, Texture::FlagTarget | Texture::FlagMultisample4, samples)),
+          resolve(test.makeTexture(size, Texture::FlagTarget)),
+          pixels(test.makeBuffer(size * size * 4, 0)) {
+        Expected<std::unique_ptr<NativeQuery>> native = test.backend->createQuery(Query::TypeSamples);
+        EXPECT_THAT(native, IsOk());
+        query = wrap(new QueryObject(nullptr, Query::TypeSamples), std::move(*native));
         constexpr StageMask undefined = 0;
         list.transition(color.get(), first_slice, Layout::Undefined, Layout::ColorTarget, undefined, color_target);
         list.transition(resolve.get(), first_slice, Layout::Undefined, Layout::ColorTarget, undefined, color_target);
@@ -376,26 +390,18 @@ TEST_F(VulkanBackendTest, UniformsAndPushConstantsChange) {
 
 TEST_F(VulkanBackendTest, SplitTargetsResolveOnceAndCountAllSamples) {
     open(true);
-    constexpr uint32_t size = 8, samples = 4;
-    const Ref<PipelineObject> pipeline = makePipeline(samples);
-    const Ref<TextureObject> color = makeTexture(size, Texture::FlagTarget | Texture::FlagMultisample4, samples);
-    const Ref<TextureObject> resolve = makeTexture(size, Texture::FlagTarget);
-    const Ref<BufferObject> pixels = makeBuffer(size * size * 4, 0);
-    Expected<std::unique_ptr<NativeQuery>> native = backend->createQuery(Query::TypeSamples);
-    ASSERT_THAT(native, IsOk());
-    const Ref<QueryObject> query = wrap(new QueryObject(nullptr, Query::TypeSamples), std::move(*native));
-    const SplitPass pass(pipeline, color, resolve, query, pixels, size);
+    constexpr uint32_t size = SplitPass::size;
+    const SplitPass pass(*this);
     run(pass.list);
     for (uint32_t y = 0; y < size; y++)
-        EXPECT_EQ(data<uint32_t>(pixels)[y * size], y < size / 2 ? 0x0000ffffu : 0u) << "row " << y;
-    const auto result = backend->queryResult(*query->nativeQuery());
+        EXPECT_EQ(data<uint32_t>(pass.pixels)[y * size], y < size / 2 ? 0x0000ffffu : 0u) << "row " << y;
+    const auto result = backend->queryResult(*pass.query->nativeQuery());
     ASSERT_THAT(result, IsOk());
-    EXPECT_EQ((*result)[0], 2u * size * size / 2 * samples);
+    EXPECT_EQ((*result)[0], 2u * size * size / 2 * SplitPass::samples);
 }
 
 TEST_F(VulkanBackendTest, WarmFramesMakeNothing) {
     open(false);
-    constexpr uint32_t size = 8, samples = 4;
     const Ref<KernelObject> kernel = makeKernel(add_kernel);
     const Ref<BufferObject> values = makeBuffer(64, Buffer::FlagStorage);
     List dispatches;
@@ -406,14 +412,7 @@ TEST_F(VulkanBackendTest, WarmFramesMakeNothing) {
         const DispatchCommand command = addCommand(dispatches, kernel, values, bound, 1, i % 8);
         dispatches.add(CommandType::Dispatch, command, compute, compute);
     }
-    const Ref<PipelineObject> pipeline = makePipeline(samples);
-    const Ref<TextureObject> color = makeTexture(size, Texture::FlagTarget | Texture::FlagMultisample4, samples);
-    const Ref<TextureObject> resolve = makeTexture(size, Texture::FlagTarget);
-    const Ref<BufferObject> pixels = makeBuffer(size * size * 4, 0);
-    Expected<std::unique_ptr<NativeQuery>> native = backend->createQuery(Query::TypeSamples);
-    ASSERT_THAT(native, IsOk());
-    const Ref<QueryObject> query = wrap(new QueryObject(nullptr, Query::TypeSamples), std::move(*native));
-    const SplitPass pass(pipeline, color, resolve, query, pixels, size);
+    const SplitPass pass(*this);
 
     bool good = true;
     const auto frame = [&] {  // no matchers: they allocate

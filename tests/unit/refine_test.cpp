@@ -1,183 +1,9 @@
-#include "support/matchers.h"
-#include "support/reference.h"
-#include "support/subdivision.h"
-
-#include <glint/geometry/primitives.h>
-#include <glint/geometry/refine.h>
+#include "cages.h"
 
 #include <glm/geometric.hpp>
 
-#include <gtest/gtest.h>
-
-#include <limits>
-#include <set>
-
 using namespace glint;
 using namespace glint::test;
-
-namespace {
-
-constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr Subdivision catmull_clark = Subdivision::CatmullClark;
-constexpr Subdivision loop = Subdivision::Loop;
-
-PolygonMesh makeMesh(std::vector<Vector3f> positions, const std::vector<std::vector<uint32_t>>& faces) {
-    PolygonMesh mesh;
-    mesh.positions = std::move(positions);
-    mesh.offsets = {0};
-    for (const auto& face : faces) {
-        mesh.indices.insert(mesh.indices.end(), face.begin(), face.end());
-        mesh.offsets.push_back(static_cast<uint32_t>(mesh.indices.size()));
-    }
-    return mesh;
-}
-
-PolygonMesh cube() {
-    return makeMesh(
-        {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1}, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1}, {-1, 1, 1}},
-        {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}});
-}
-
-/// n corners below and above; with a point in the middle of either end, so that there are two vertices of n edges, or
-/// with polygons of n corners.
-PolygonMesh prism(uint32_t n, bool with_poles, bool open = false) {
-    std::vector<Vector3f> positions;
-    for (const float z : {-1.0f, 1.0f})
-        for (uint32_t i = 0; i < n; i++) {
-            const float angle = 2.0f * pi * static_cast<float>(i) / static_cast<float>(n);
-            positions.emplace_back(std::cos(angle), std::sin(angle), z);
-        }
-    std::vector<std::vector<uint32_t>> faces;
-    std::vector<uint32_t> bottom, top;
-    for (uint32_t i = 0; i < n; i++) {
-        const uint32_t j = (i + 1) % n;
-        faces.push_back({i, j, n + j, n + i});
-        bottom.insert(bottom.begin(), i);
-        top.push_back(n + i);
-        if (!with_poles) continue;
-        faces.push_back({j, i, 2 * n});
-        if (!open) faces.push_back({n + i, n + j, 2 * n + 1});
-    }
-    if (with_poles) {
-        positions.emplace_back(0, 0, -1.4);
-        if (!open) positions.emplace_back(0, 0, 1.3);
-    } else {
-        faces.push_back(bottom);
-        if (!open) faces.push_back(top);
-    }
-    return makeMesh(positions, faces);
-}
-
-/// Quadrilaterals cut in two, for Loop.
-PolygonMesh triangles(const PolygonMesh& mesh) {
-    Expected<Mesh> cut = toTriangles(mesh);
-    EXPECT_THAT(cut, IsOk());
-    PolygonMesh result = *toPolygons(*cut);
-    result.creases = mesh.creases;
-    return result;
-}
-
-/// A grid of columns * rows points in the plane, moved at random by up to `noise`.
-PolygonMesh grid(uint32_t columns, uint32_t rows, float noise, bool cut = false) {
-    Random random(7);
-    std::vector<Vector3f> positions;
-    std::vector<std::vector<uint32_t>> faces;
-    for (uint32_t j = 0; j < rows; j++)
-        for (uint32_t i = 0; i < columns; i++)
-            positions.push_back(Vector3f(i, j, 0) + noise * Vector3f(random.direction()));
-    for (uint32_t j = 0; j + 1 < rows; j++)
-        for (uint32_t i = 0; i + 1 < columns; i++) {
-            const uint32_t a = j * columns + i, b = a + 1, c = b + columns, d = a + columns;
-            if (cut)
-                faces.insert(faces.end(), {{a, b, c}, {a, c, d}});
-            else
-                faces.push_back({a, b, c, d});
-        }
-    return makeMesh(positions, faces);
-}
-
-void shake(PolygonMesh& mesh, uint64_t seed, double amount = 0.3) {
-    Random random(seed);
-    for (Vector3f& p : mesh.positions) p += Vector3f(amount * random.direction());
-}
-
-std::set<std::pair<uint32_t, uint32_t>> edgesOf(const PolygonMesh& mesh) {
-    std::set<std::pair<uint32_t, uint32_t>> edges;
-    for (size_t face = 0; face < mesh.faceCount(); face++)
-        for (uint32_t corner = mesh.offsets[face]; corner < mesh.offsets[face + 1]; corner++) {
-            const uint32_t next = corner + 1 < mesh.offsets[face + 1] ? corner + 1 : mesh.offsets[face];
-            edges.insert(std::minmax(mesh.indices[corner], mesh.indices[next]));
-        }
-    return edges;
-}
-
-/// Creases the given share of the edges; `sharpness` 0 chooses one of 0.25, 0.5, ... 3 for each.
-void crease(PolygonMesh& mesh, uint64_t seed, double share, float sharpness) {
-    Random random(seed);
-    for (const auto& [a, b] : edgesOf(mesh))
-        if (random.uniform() < share)
-            mesh.creases.push_back(
-                {a, b, sharpness > 0 ? sharpness : 0.25f * static_cast<float>(1 + random.below(12))});
-}
-
-long eulerCharacteristic(const PolygonMesh& mesh) {
-    return static_cast<long>(mesh.positions.size()) - static_cast<long>(edgesOf(mesh).size()) +
-           static_cast<long>(mesh.faceCount());
-}
-
-struct Case {
-    const char* name;
-    Subdivision scheme;
-    PolygonMesh cage;
-    bool closed;
-};
-
-/// Cages with vertices of 3 to 9 edges, polygons of 3 to 7 corners, closed and open, with and without creases.
-std::vector<Case> cases() {
-    std::vector<Case> list;
-    const auto add = [&](const char* name, PolygonMesh mesh, bool closed) {
-        list.push_back({name, catmull_clark, mesh, closed});
-        PolygonMesh cut = triangles(mesh);
-        if (cut.indices.size() / 3 == cut.faceCount()) list.push_back({name, loop, std::move(cut), closed});
-    };
-    add("cube", cube(), true);
-    add("prism with polygons", prism(7, false), true);
-    add("prism with poles", prism(9, true), true);
-    add("open prism", prism(6, true, true), false);
-    add("open prism with polygon", prism(5, false, true), false);
-    add("grid", grid(4, 5, 0.2f), false);
-    add("one triangle", makeMesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}), false);
-    list.push_back({"grid of triangles", loop, grid(5, 4, 0.2f, true), false});
-    list.push_back({"torus", catmull_clark, createTorusQuads(2.0f, 0.7f, 5, 4), true});
-    const size_t plain = list.size();
-    for (size_t i = 0; i < plain; i++) {
-        shake(list[i].cage, i);
-        Case creased = list[i];
-        creased.cage.creases.clear();
-        crease(creased.cage, i, 0.3, infinity);
-        list.push_back(creased);
-    }
-    return list;
-}
-
-/// Half a unit in the last place of float32, and rounding of float64 (see refine).
-double roundingOf(const Vector3d& p, double largest) {
-    return 0x1p-24 * std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)}) + 1e-13 * largest;
-}
-
-double largestOf(const PolygonMesh& mesh) {
-    double largest = 0.0;
-    for (const Vector3f& p : mesh.positions)
-        largest = std::max({largest, std::abs(double{p.x}), std::abs(double{p.y}), std::abs(double{p.z})});
-    return largest;
-}
-
-bool isClosedPolygons(const PolygonMesh& mesh) {
-    const Expected<Mesh> cut = toTriangles(mesh);
-    return cut && isClosed(*cut);
-}
-
-}  // namespace
 
 // The torus of the tutorials: 176 quadrilaterals, four steps, 90,112 triangles.
 TEST(Refine, TutorialTorus) {
@@ -204,7 +30,7 @@ TEST(Refine, TutorialTorus) {
 }
 
 TEST(Refine, CountsAndTopologyAreThoseOfTheScheme) {
-    for (const Case& c : cases()) {
+    for (const CageCase& c : cageCases()) {
         SCOPED_TRACE(c.name);
         const size_t corners = c.cage.indices.size(), edges = edgesOf(c.cage).size();
         for (const uint32_t steps : {0u, 1u, 2u, 3u}) {
@@ -232,15 +58,15 @@ TEST(Refine, CountsAndTopologyAreThoseOfTheScheme) {
 }
 
 TEST(Refine, MatchesTheRulesInFloat64) {
-    std::vector<Case> all = cases();
+    std::vector<CageCase> all = cageCases();
     const size_t count = all.size();
     for (size_t i = 0; i < count; i++) {
-        Case semi = all[i];
+        CageCase semi = all[i];
         semi.cage.creases.clear();
         crease(semi.cage, 100 + i, 0.5, 0.0f);
         all.push_back(semi);
     }
-    for (const Case& c : all) {
+    for (const CageCase& c : all) {
         SCOPED_TRACE(std::string(c.name) + (c.scheme == loop ? ", Loop" : ", Catmull-Clark"));
         ReferenceSurface reference(c.cage);
         for (int step = 0; step < 3; step++) reference = subdivide(reference, c.scheme);
@@ -329,176 +155,10 @@ TEST(Refine, SharpnessIsContinuous) {
     EXPECT_NEAR(last, 8.0, 1e-5);
 }
 
-// ---------------------------------------------------------------------------------------------------- limit surface
-
-TEST(Limit, PositionsAreWhereRefiningLeads) {
-    for (const Case& c : cases()) {
-        SCOPED_TRACE(std::string(c.name) + (c.scheme == loop ? ", Loop, " : ", Catmull-Clark, ") +
-                     std::to_string(c.cage.creases.size()) + " creases");
-        const ReferenceSurface reference(c.cage);
-        const Expected<PolygonMesh> limit = toLimit(c.cage, c.scheme);
-        ASSERT_THAT(limit, IsOk());
-        for (uint32_t vertex = 0; vertex < c.cage.positions.size(); vertex++) {
-            const Vector3d expected = limitPosition(reference, vertex, c.scheme);
-            const double bound = roundingOf(expected, largestOf(c.cage));
-            for (int axis = 0; axis < 3; axis++)
-                EXPECT_NEAR(limit->positions[vertex][axis], expected[axis], bound) << "vertex " << vertex;
-        }
-    }
-}
-
-TEST(Limit, NormalsAreWhereRefiningLeads) {
-    std::vector<Case> all = cases();
-    // Darts.
-    for (const uint32_t n : {3u, 4u, 5u, 6u, 8u, 11u}) {
-        PolygonMesh cage = prism(n, true);
-        cage.creases.push_back({0, 2 * n, infinity});
-        shake(cage, n);
-        all.push_back({"dart", catmull_clark, cage, true});
-        PolygonMesh cut = triangles(prism(n, true));
-        cut.creases.push_back({cut.indices[0], cut.indices[1], infinity});
-        shake(cut, n);
-        all.push_back({"dart", loop, cut, true});
-    }
-    size_t compared = 0;
-    for (const Case& c : all) {
-        SCOPED_TRACE(std::string(c.name) + (c.scheme == loop ? ", Loop, " : ", Catmull-Clark, ") +
-                     std::to_string(c.cage.positions.size()) + " vertices, " + std::to_string(c.cage.creases.size()) +
-                     " creases");
-        const ReferenceSurface reference(c.cage);
-        const PolygonMesh limit = *toLimit(c.cage, c.scheme);
-        const PolygonAttribute& normals = *limit.attribute("normal");
-        std::map<std::pair<uint32_t, uint32_t>, int> sides;
-        for (const auto& face : reference.faces)
-            for (size_t k = 0; k < face.size(); k++) sides[std::minmax(face[k], face[(k + 1) % face.size()])]++;
-        std::vector<uint32_t> sharp(c.cage.positions.size(), 0);
-        for (const auto& [edge, count] : sides)
-            if (count == 1 || reference.sharpness.count(edge)) sharp[edge.first]++, sharp[edge.second]++;
-        std::vector<uint32_t> sector(normals.values.size() / 3, 0);
-        for (const uint32_t index : normals.indices) sector[index]++;
-
-        for (size_t face = 0; face < reference.faces.size(); face++)
-            for (size_t k = 0; k < reference.faces[face].size(); k++) {
-                const uint32_t vertex = reference.faces[face][k];
-                const uint32_t index = normals.indices[c.cage.offsets[face] + k];
-                const float* n = &normals.values[3 * index];
-                const Vector3d normal(n[0], n[1], n[2]);
-                EXPECT_NEAR(glm::length(normal), 1.0, 1e-6);
-                // Some have no tangent plane, see toLimit.
-                if (sharp[vertex] > 2) continue;
-                if (sharp[vertex] == 2 && sector[index] >= (c.scheme == loop ? 6 : 4)) continue;
-                const auto f = static_cast<uint32_t>(face);
-                const Vector3d near = limitNormal(reference, vertex, f, c.scheme, 20);
-                const Vector3d nearer = limitNormal(reference, vertex, f, c.scheme, 40);
-                // The reference comes nearer with each step, by a factor or (one face at a crease) like 1 / steps: what
-                // is left is no more than about what step 20 to 40 have brought. 1e-6 is for float32.
-                const double left = glm::length(nearer - near);
-                EXPECT_LE(glm::length(normal - nearer), 4 * left + 1e-6)
-                    << "face " << face << " corner " << k << " sharp " << sharp[vertex] << " sector " << sector[index];
-                EXPECT_LE(left, 0.1);
-                compared += left < 1e-6;
-            }
-    }
-    EXPECT_GT(compared, 700u);
-}
-
-// The limit does not depend on when it is taken.
-TEST(Limit, IsTheSameAfterRefining) {
-    for (const Case& c : cases()) {
-        SCOPED_TRACE(c.name);
-        const PolygonMesh early = *toLimit(c.cage, c.scheme), late = *toLimit(c.cage, c.scheme, 2);
-        for (size_t i = 0; i < early.positions.size(); i++)
-            for (int axis = 0; axis < 3; axis++)
-                EXPECT_NEAR(early.positions[i][axis], late.positions[i][axis],
-                            2 * roundingOf(Vector3d(early.positions[i]), largestOf(c.cage)))
-                    << "vertex " << i;
-    }
-}
-
-// The parameters are an attribute: refined and brought to the limit as positions are, they come out at the limit's own.
-TEST(Limit, RegularQuadrilateralsAreBicubicSplines) {
-    PolygonMesh cage = grid(6, 7, 0.3f);
-    PolygonAttribute parameters{.name = "parameters", .components = 2, .values = {}, .indices = cage.indices};
-    for (int j = 0; j < 7; j++)
-        for (int i = 0; i < 6; i++) parameters.values.insert(parameters.values.end(), {float(i), float(j)});
-    cage.attributes.push_back(parameters);
-    std::vector<Vector3d> points;
-    for (const Vector3f& p : cage.positions) points.emplace_back(p);
-
-    const PolygonMesh limit = *toLimit(cage, catmull_clark, 3);
-    const PolygonAttribute& where = *limit.attribute("parameters");
-    const PolygonAttribute& normals = *limit.attribute("normal");
-    for (size_t corner = 0; corner < limit.indices.size(); corner++) {
-        const double u = where.values[2 * where.indices[corner]], v = where.values[2 * where.indices[corner] + 1];
-        // Eighths, but for rounding.
-        ASSERT_NEAR(u * 8, std::round(u * 8), 1e-5);
-        const SplinePoint expected = bicubicSpline(points, 6, std::round(u * 8) / 8, std::round(v * 8) / 8);
-        const Vector3d position(limit.positions[limit.indices[corner]]);
-        for (int axis = 0; axis < 3; axis++)
-            ASSERT_NEAR(position[axis], expected.value[axis], roundingOf(expected.value, 7.0)) << u << ", " << v;
-        const float* n = &normals.values[3 * normals.indices[corner]];
-        // Components of a unit vector in float32.
-        ASSERT_LE(glm::length(Vector3d(n[0], n[1], n[2]) - glm::normalize(glm::cross(expected.du, expected.dv))), 1e-7);
-    }
-}
-
-TEST(Limit, RegularTrianglesAreBoxSplines) {
-    PolygonMesh cage = grid(7, 6, 0.3f, true);
-    PolygonAttribute parameters{.name = "parameters", .components = 2, .values = {}, .indices = cage.indices};
-    for (int j = 0; j < 6; j++)
-        for (int i = 0; i < 7; i++) parameters.values.insert(parameters.values.end(), {float(i), float(j)});
-    cage.attributes.push_back(parameters);
-    std::vector<Vector3d> points;
-    for (const Vector3f& p : cage.positions) points.emplace_back(p);
-
-    const PolygonMesh limit = *toLimit(cage, loop, 2);
-    const PolygonAttribute& where = *limit.attribute("parameters");
-    const PolygonAttribute& normals = *limit.attribute("normal");
-    std::set<uint32_t> seen;
-    for (size_t corner = 0; corner < limit.indices.size(); corner++) {
-        const double u = where.values[2 * where.indices[corner]], v = where.values[2 * where.indices[corner] + 1];
-        if (u < 1.99 || u > 4.01 || v < 1.99 || v > 3.01 || !seen.insert(limit.indices[corner]).second) continue;
-        ASSERT_NEAR(u * 4, std::round(u * 4), 1e-5);
-        const SplinePoint expected = boxSpline(points, 7, std::round(u * 4) / 4, std::round(v * 4) / 4);
-        const Vector3d position(limit.positions[limit.indices[corner]]);
-        // The reference is evaluated 1.3e-10 away from the place, where it slopes by less than 2.
-        for (int axis = 0; axis < 3; axis++)
-            EXPECT_NEAR(position[axis], expected.value[axis], roundingOf(expected.value, 7.0) + 3e-10);
-        const float* n = &normals.values[3 * normals.indices[corner]];
-        EXPECT_LE(glm::length(Vector3d(n[0], n[1], n[2]) - glm::normalize(glm::cross(expected.du, expected.dv))), 1e-7);
-    }
-    EXPECT_EQ(seen.size(), 9u * 5u);
-}
-
-TEST(Limit, TangentsThatVanish) {
-    // Two triangles back to back: nothing is left to be told from the tangents.
-    const PolygonMesh pillow = makeMesh({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 1}});
-    for (const Subdivision scheme : {catmull_clark, loop})
-        for (const uint32_t steps : {0u, 1u, 3u}) {
-            const Expected<PolygonMesh> limit = toLimit(pillow, scheme, steps);
-            ASSERT_THAT(limit, IsOk());
-            EXPECT_EQ(eulerCharacteristic(*limit), scheme == loop && steps > 0 ? eulerCharacteristic(*limit) : 2);
-            for (const float x : limit->attribute("normal")->values) EXPECT_TRUE(std::isfinite(x));
-        }
-    PolygonMesh point = cube();
-    for (Vector3f& p : point.positions) p = {1, 2, 3};
-    const PolygonMesh limit = *toLimit(point, catmull_clark, 2);
-    for (const Vector3f& p : limit.positions) EXPECT_EQ(p, Vector3f(1, 2, 3));
-    const PolygonAttribute& normals = *limit.attribute("normal");
-    for (size_t i = 0; i < normals.values.size(); i += 3) EXPECT_EQ(normals.values[i + 2], 1.0f);
-}
-
-TEST(Limit, WantsCreasesDone) {
-    PolygonMesh cage = cube();
-    cage.creases = {{0, 1, 1.5f}, {1, 2, infinity}};
-    EXPECT_THAT(toLimit(cage, catmull_clark, 1), HasErrorId("refine.crease_left"));
-    EXPECT_THAT(toLimit(cage, catmull_clark, 2), IsOk());
-}
-
 // ------------------------------------------------------------------------------------------------------- attributes
 
 TEST(Refine, AttributesWithoutSeamsGoWhereThePositionsGo) {
-    for (Case& c : std::vector<Case>(cases())) {
+    for (CageCase& c : std::vector<CageCase>(cageCases())) {
         SCOPED_TRACE(c.name);
         PolygonAttribute copy{.name = "copy", .components = 3, .values = {}, .indices = c.cage.indices};
         for (const Vector3f& p : c.cage.positions) copy.values.insert(copy.values.end(), {p.x, p.y, p.z});

@@ -146,6 +146,20 @@ bool NullControl::isWindowLost() const {
     return window_lost_;
 }
 
+void NullControl::setPresentation(std::function<void()> presentation) {
+    std::lock_guard lock(mutex_);
+    presentation_ = std::move(presentation);
+}
+
+void NullControl::present() const {
+    std::function<void()> presentation;
+    {
+        std::lock_guard lock(mutex_);
+        presentation = presentation_;
+    }
+    if (presentation) presentation();
+}
+
 void NullControl::setObserver(Observer observer) {
     std::lock_guard lock(mutex_);
     observer_ = std::move(observer);

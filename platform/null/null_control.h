@@ -96,6 +96,9 @@ public:
     /// The window system takes the device's windows away: acquiring and presenting fail with "window.lost".
     void loseWindow();
 
+    /// Called when a window presents a picture, as a display that makes its caller wait.
+    void setPresentation(std::function<void()> presentation);
+
     /// Called with each submission and the checker before it judges it. Must not call this object.
     using Observer = std::function<void(const detail::Submission&, const HazardChecker&)>;
     void setObserver(Observer observer);
@@ -127,6 +130,7 @@ public:
     detail::WindowEvents takeWindowEvents(const detail::WindowEvents& before);
     bool takeOutdated();
     bool isWindowLost() const;
+    void present() const;
 
 private:
     struct Pending {
@@ -162,6 +166,7 @@ private:
     bool window_lost_ = false;
     std::function<void(const Error&, bool warning)> message_;
     Observer observer_;
+    std::function<void()> presentation_;
     HazardChecker checker_;
 };
 

@@ -62,6 +62,7 @@ Expected<uint32_t> NullWindow::acquire() {
 }
 
 Status NullWindow::present() {
+    control_->present();
     if (control_->isWindowLost()) return lostWindow();
     if (control_->takeOutdated()) outdated = true;
     return {};

@@ -174,16 +174,6 @@ Expected<std::unique_ptr<NativeWindow>> VulkanDevice::createWindow(const WindowD
     return VulkanWindow::create(*this, desc);
 }
 
-VkResult VulkanDevice::present(const VkPresentInfoKHR& info) {
-    const std::lock_guard lock(submit_mutex_);
-    return vk.QueuePresentKHR(queue(Queue::Main).handle(), &info);
-}
-
-void VulkanDevice::waitPresented() {
-    const std::lock_guard lock(submit_mutex_);
-    vk.QueueWaitIdle(queue(Queue::Main).handle());
-}
-
 uint32_t VulkanDevice::instanceSize() const { return instance_size; }
 
 void VulkanDevice::writeInstances(std::span<const Tracing::Instance> instances,

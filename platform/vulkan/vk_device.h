@@ -76,11 +76,6 @@ public:
     /// The error of a lost device, with what is known of its queues.
     Error lost(const char* call) const;
 
-    /// vkQueuePresentKHR, and a wait for all that it and submissions were asked for, on the main queue, which
-    /// submissions of other threads have to stay away from.
-    VkResult present(const VkPresentInfoKHR& info);
-    void waitPresented();
-
     /// Debug name, where the instance takes them.
     template <class T>
     void setName(VkObjectType type, T object, const std::string& name) const {
@@ -88,6 +83,7 @@ public:
     }
 
     const VulkanQueue& queue(Queue queue) const { return *queues_[static_cast<size_t>(queue)]; }
+    VulkanQueue& queue(Queue queue) { return *queues_[static_cast<size_t>(queue)]; }
 
     // What the objects of this back end use. Constant once the device is there, but for what locks by itself.
     const Adapter adapter;

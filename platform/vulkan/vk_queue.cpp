@@ -136,13 +136,27 @@ Status VulkanQueue::submit(const detail::Submission& submission, std::span<const
     info.pCommandBufferInfos = &commands;
     info.signalSemaphoreInfoCount = signal ? 2 : 1;
     info.pSignalSemaphoreInfos = signals;
-    const VkResult result = device_.vk.QueueSubmit2(handle_, 1, &info, frame->fence);
+    VkResult result = VK_SUCCESS;
+    {
+        const std::lock_guard lock(handle_mutex_);
+        result = device_.vk.QueueSubmit2(handle_, 1, &info, frame->fence);
+    }
     if (result != VK_SUCCESS) {
         recycle(std::move(frame));
         return resultError("vkQueueSubmit2", result);
     }
     pending_.push_back(std::move(frame));
     return {};
+}
+
+VkResult VulkanQueue::present(const VkPresentInfoKHR& info) {
+    const std::lock_guard lock(handle_mutex_);
+    return device_.vk.QueuePresentKHR(handle_, &info);
+}
+
+void VulkanQueue::waitPresented() {
+    const std::lock_guard lock(handle_mutex_);
+    device_.vk.QueueWaitIdle(handle_);
 }
 
 void VulkanQueue::settle(uint64_t value) const {

@@ -7,6 +7,7 @@
 #include <glint/device/detail/backend.h>
 
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -23,7 +24,7 @@ struct Frame {
     std::string regions;  ///< names of the lists and outer regions, for the message of a lost device
 };
 
-/// A queue with its time line. All but completed() under the submit lock.
+/// A queue with its time line. All but what says so under the submit lock.
 class VulkanQueue {
 public:
     VulkanQueue(VulkanDevice& device, VkQueue handle, uint32_t family, VkQueueFlags flags, uint32_t timestamp_bits);
@@ -35,6 +36,10 @@ public:
     /// `signal`: a binary semaphore to be signaled besides the time line, or none.
     Status submit(const detail::Submission& submission, std::span<const VkSemaphoreSubmitInfo> waits,
                   VkSemaphore signal);
+    /// vkQueuePresentKHR, and a wait for all that it and submissions were asked for. From any thread, without the
+    /// submit lock: others submit to other queues meanwhile.
+    VkResult present(const VkPresentInfoKHR& info);
+    void waitPresented();
     /// With validation only: waits for the fences of what was submitted up to `value`.
     void settle(uint64_t value) const;
     /// From any thread.
@@ -57,6 +62,7 @@ private:
     void recycleCompleted();
 
     VulkanDevice& device_;
+    std::mutex handle_mutex_;  // of the queue itself; taken after the submit lock
     const VkQueue handle_;
     const uint32_t family_;
     const VkQueueFlags flags_;

@@ -60,7 +60,7 @@ VkResult Swapchain::present() {
     info.swapchainCount = 1;
     info.pSwapchains = &handle_;
     info.pImageIndices = &index_;
-    return device_.present(info);
+    return device_.queue(Queue::Main).present(info);
 }
 
 }  // namespace glint::vulkan

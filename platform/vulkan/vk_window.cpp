@@ -45,7 +45,7 @@ Expected<std::unique_ptr<VulkanWindow>> VulkanWindow::create(VulkanDevice& devic
 }
 
 VulkanWindow::~VulkanWindow() {
-    if (swapchain_ || !retired_.empty()) device_.waitPresented();
+    if (swapchain_ || !retired_.empty()) device_.queue(Queue::Main).waitPresented();
     retired_.clear();
     swapchain_.reset();
     if (surface_) device_.instance->vk.DestroySurfaceKHR(device_.instance->handle, surface_, nullptr);

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
+#include <future>
 #include <limits>
 #include <thread>
 
@@ -195,6 +196,24 @@ TEST_F(NullWindowTest, TwoFramesAreUnderWayAtMost) {
     EXPECT_TRUE(done);
     releases.join();
     EXPECT_THAT(window.present(), IsOk());
+}
+
+// A display that shows one picture after the other may let its caller wait for it.
+TEST_F(NullWindowTest, NobodyElseWaitsForAPresentation) {
+    std::future<Status> other;
+    control->setPresentation([&] {
+        other = std::async(std::launch::async, [&] {
+            const Buffer buffer = device.createBuffer(Buffer::FlagStorage, 64);
+            device.clearBuffer(buffer);
+            Compute list = device.createCompute(Queue::Compute);
+            list.clearBuffer(buffer);
+            return device.submit(list);
+        });
+        EXPECT_EQ(other.wait_for(std::chrono::seconds(10)), std::future_status::ready);
+    });
+    EXPECT_THAT(frame(), IsOk());
+    ASSERT_TRUE(other.valid());
+    EXPECT_THAT(other.get(), IsOk());
 }
 
 TEST_F(NullWindowTest, ALostWindowFails) {

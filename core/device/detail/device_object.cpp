@@ -314,13 +314,14 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
                 fence->values[static_cast<size_t>(queue)] = next_value_[static_cast<size_t>(queue)];
                 fence->values[static_cast<size_t>(Queue::Main)] = next_value_[static_cast<size_t>(Queue::Main)];
             }
-            if (status && presented) {
-                status = presented->present();
-                if (!status) {
-                    lost_ = lost_ || status.error().code() == ErrorCode::DeviceLost;
-                    status = failed(status.error(), where);
-                }
-            }
+        }
+    }
+    // Without the locks: it may wait until the display has shown another picture.
+    if (status && presented) {
+        status = presented->present();
+        if (!status) {
+            if (status.error().code() == ErrorCode::DeviceLost) setLost();
+            status = failed(status.error(), where);
         }
     }
     if (transfers) recycleRecorder(transfers);
@@ -373,10 +374,7 @@ Status DeviceObject::wait(const std::array<uint64_t, queue_count>& values, uint6
     if (count == 0) return {};
     const Status status = backend->wait({points.data(), count}, nanoseconds);
     if (!status) {
-        if (status.error().code() == ErrorCode::DeviceLost) {
-            std::lock_guard lock(submit_mutex_);
-            lost_ = true;
-        }
+        if (status.error().code() == ErrorCode::DeviceLost) setLost();
         return failed(status.error(), where);
     }
     collect();
@@ -384,6 +382,11 @@ Status DeviceObject::wait(const std::array<uint64_t, queue_count>& values, uint6
 }
 
 bool DeviceObject::isDone(const std::array<uint64_t, queue_count>& values) { return passed(*backend, values); }
+
+void DeviceObject::setLost() {
+    std::lock_guard lock(submit_mutex_);
+    lost_ = true;
+}
 
 bool DeviceObject::isLost() {
     std::lock_guard lock(submit_mutex_);

@@ -121,6 +121,7 @@ private:
     Error checkPictures(const RecorderCore& recorder) const;
     Status play(Queue queue, Where where, NativeWindow* presented);
     Status failed(Error error, Where where);
+    void setLost();
 
     MessageCallback message_;
     Features features_;

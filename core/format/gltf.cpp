@@ -217,6 +217,7 @@ private:
 
     Status readImages(const json& images, const GltfAccessors& accessors, Scene& scene) {
         const GltfPath list = root_ / "images";
+        scene.images.reserve(images.size());
         for (size_t i = 0; i < images.size(); i++) {
             const json& source = images[i];
             const GltfPath path = list / i;

@@ -20,7 +20,8 @@ struct GltfOptions {
     /// Names the document in errors.
     std::string name = "glTF";
     /// Bounds the bytes of the scene, of what the document names, and of what tinygltf makes of it. Beside them the
-    /// reader takes at most 128 bytes for each byte of the JSON text, and five times an image while it is decoded.
+    /// reader takes at most 128 bytes for each byte of the JSON text, the largest accessor once more, and five times an
+    /// image while it is decoded.
     uint64_t limit = Mesh::default_limit;
     /// Without images, Scene::images holds their names alone, and their files are not asked for.
     bool with_images = true;

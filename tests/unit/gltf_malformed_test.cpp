@@ -1,5 +1,6 @@
 // Every defect of a document has its id, and the error names the element.
 
+#include "support/allocations.h"
 #include "support/gltf_builder.h"
 #include "support/matchers.h"
 #include "support/reference.h"
@@ -414,4 +415,83 @@ TEST(GltfMalformed, MutationsAreErrorsOrScenes) {
     }
     setLogCallback({});
     EXPECT_GT(sound_ones, 200);
+}
+
+namespace {
+
+std::string listOf(const char* element, size_t count) {
+    std::string text = element;
+    for (size_t i = 1; i < count; i++) text.append(",").append(element);
+    return "[" + text + "]";
+}
+
+std::string documentOf(const std::string& properties) { return "{\"asset\":{\"version\":\"2.0\"}," + properties + "}"; }
+
+/// The least limit, or a little more, that is enough.
+uint64_t leastLimit(std::span<const std::byte> bytes) {
+    GltfOptions options;
+    uint64_t low = 0, high = 1 << 28;
+    while (high - low > (low >> 6) + 256) {
+        options.limit = (low + high) / 2;
+        const Expected<Scene> scene = parseGltf(bytes, options);
+        (!scene && scene.error().id() == "gltf.too_large" ? low : high) = options.limit;
+    }
+    return high;
+}
+
+/// What is beyond the limit, which is just enough, and beyond 128 bytes for each byte of JSON and the largest accessor.
+void expectWithinLimits(const char* what, std::span<const std::byte> bytes, uint64_t json_size, uint64_t accessor = 0) {
+    constexpr uint64_t slack = 2 << 20;  // pages of the allocator
+    GltfOptions options;
+    options.limit = leastLimit(bytes);
+    const uint64_t peak = peakMemory([&] { (void)parseGltf(bytes, options); });
+    EXPECT_LE(peak, options.limit + 128 * json_size + accessor + slack)
+        << what << ": " << (static_cast<double>(peak) - static_cast<double>(options.limit)) / double(json_size)
+        << " bytes a byte of JSON beside a limit of " << options.limit;
+}
+
+}  // namespace
+
+// What takes most for its bytes. Lists have just doubled their room where they have an element more than a power of
+// two.
+TEST(GltfMalformed, MemoryStaysWithinItsLimits) {
+    setLogCallback([](LogLevel, std::string_view, std::string_view) {});
+    constexpr size_t many = (1 << 14) + 1;
+    const std::string meshes = "\"accessors\":[{\"componentType\":5126,\"count\":1,\"type\":\"VEC3\"}],\"meshes\":";
+    std::string names = "\"0\":0";
+    for (size_t i = 1; i < many; i++) names += ",\"" + std::to_string(i) + "\":0";
+    const std::pair<const char*, std::string> documents[] = {
+        {"nested", std::string(many * 4, '[')},
+        {"nested extras", documentOf("\"extras\":" + std::string(many * 2, '[') + std::string(many * 2, ']'))},
+        {"empty objects in extras", documentOf("\"extras\":" + listOf("{}", many))},
+        {"names in extras", documentOf("\"extras\":{" + names + "}")},
+        {"weights", documentOf("\"nodes\":[{\"weights\":" + listOf("0", many) + "}]")},
+        {"children", documentOf("\"nodes\":[{\"children\":" + listOf("0", many) + "}]")},
+        {"joints", documentOf("\"nodes\":[{}],\"skins\":[{\"joints\":" + listOf("0", many) + "}]")},
+        {"attributes", documentOf(meshes + "[{\"primitives\":[{\"attributes\":{" + names + "}}]}]")},
+        {"targets",
+         documentOf("\"meshes\":[{\"primitives\":[{\"attributes\":{},\"targets\":" + listOf("{}", many) + "}]}]")},
+        {"attributes of targets",
+         documentOf(meshes + "[{\"primitives\":[{\"attributes\":{},\"targets\":" + listOf("{\"\":0}", many) + "}]}]")},
+        {"primitives", documentOf("\"meshes\":[{\"primitives\":" + listOf("{\"attributes\":{}}", many) + "}]")},
+        {"meshes", documentOf("\"meshes\":" + listOf("{\"primitives\":[]}", many))},
+        {"nodes", documentOf("\"nodes\":" + listOf("{}", many))},
+        {"scenes", documentOf("\"scenes\":" + listOf("{}", many))},
+        {"samplers", documentOf("\"samplers\":" + listOf("{}", many))},
+        {"materials", documentOf("\"materials\":" + listOf("{}", many / 2 + 1))},
+        {"data", documentOf("\"buffers\":[{\"byteLength\":1,\"uri\":\"data:application/octet-stream;base64," +
+                            std::string(many * 4, 'A') + "\"}]")},
+    };
+    for (const auto& [name, text] : documents) expectWithinLimits(name, std::as_bytes(std::span(text)), text.size());
+
+    // Colours of three bytes become four floats.
+    constexpr size_t vertices = 3 * 87382;
+    GltfBuilder builder;
+    const int colors = builder.accessor(std::vector<uint8_t>(3 * vertices), "VEC3", true);
+    builder.json["meshes"][0]["primitives"][0]["attributes"] = {{"POSITION", colors}, {"COLOR_0", colors}};
+    const std::vector<std::byte> glb = builder.glb();
+    ASSERT_THAT(parseGltf(glb), IsOk());
+    expectWithinLimits("colours", glb, 1000, vertices * sizeof(Vector3f));
+    EXPECT_GE(leastLimit(glb), vertices * (sizeof(Vector3f) + sizeof(Vector4f) + sizeof(uint32_t)));
+    setLogCallback({});
 }

@@ -104,6 +104,9 @@ private:
             accessors_.floats(accessor, {vec3_or_vec4, fractional, true}, place);
         if (!elements) return elements.error();
         if (Status status = sameCount(elements->count(), place); !status) return status;
+        const size_t added = 4 - elements->components;  // alpha, if it is absent
+        if (Status status = budget_.take(place, elements->count(), added * sizeof(float)); !status) return status;
+        primitive.colors.reserve(elements->count());
         for (size_t i = 0; i < elements->count(); i++) {
             const float* color = &elements->values[i * elements->components];
             primitive.colors.emplace_back(color[0], color[1], color[2], elements->components == 4 ? color[3] : 1.0f);
@@ -223,6 +226,7 @@ Expected<SceneMesh> makeGltfMesh(const tinygltf::Mesh& source, const GltfAccesso
     SceneMesh mesh;
     mesh.name = source.name;
     const GltfPath list = path / "primitives";
+    mesh.primitives.reserve(source.primitives.size());
     const size_t target_count = source.primitives.empty() ? 0 : source.primitives[0].targets.size();
     for (size_t i = 0; i < source.primitives.size(); i++) {
         const tinygltf::Primitive& each = source.primitives[i];

@@ -57,6 +57,7 @@ public:
         for (const auto step : {&SceneMaker::materials, &SceneMaker::meshes, &SceneMaker::skins, &SceneMaker::nodes,
                                 &SceneMaker::roots, &SceneMaker::animations, &SceneMaker::cameras, &SceneMaker::lights})
             if (Status status = (this->*step)(); !status) return unexpected(status.error());
+        scene_.textures.reserve(model_.textures.size());
         for (const tinygltf::Texture& each : model_.textures)
             scene_.textures.push_back(makeTexture(each, model_.samplers));
         return std::move(scene_);
@@ -65,6 +66,7 @@ public:
 private:
     Status materials() {
         const GltfPath list = root_ / "materials";
+        scene_.materials.reserve(model_.materials.size());
         for (size_t i = 0; i < model_.materials.size(); i++) {
             Expected<SceneMaterial> material = makeGltfMaterial(model_.materials[i], list / i);
             if (!material) return material.error();
@@ -75,6 +77,7 @@ private:
 
     Status meshes() {
         const GltfPath list = root_ / "meshes";
+        scene_.meshes.reserve(model_.meshes.size());
         for (size_t i = 0; i < model_.meshes.size(); i++) {
             Expected<SceneMesh> mesh = makeGltfMesh(model_.meshes[i], accessors_, budget_, list / i);
             if (!mesh) return mesh.error();
@@ -90,6 +93,7 @@ private:
 
     Status skins() {
         const GltfPath list = root_ / "skins";
+        scene_.skins.reserve(model_.skins.size());
         for (size_t i = 0; i < model_.skins.size(); i++) {
             const tinygltf::Skin& source = model_.skins[i];
             const GltfPath path = list / i;
@@ -115,6 +119,7 @@ private:
 
     Status nodes() {
         const GltfPath list = root_ / "nodes";
+        scene_.nodes.reserve(model_.nodes.size());
         for (size_t i = 0; i < model_.nodes.size(); i++) {
             const tinygltf::Node& source = model_.nodes[i];
             const GltfPath path = list / i;
@@ -212,6 +217,7 @@ private:
 
     Status animations() {
         const GltfPath list = root_ / "animations";
+        scene_.animations.reserve(model_.animations.size());
         for (size_t i = 0; i < model_.animations.size(); i++) {
             const tinygltf::Animation& source = model_.animations[i];
             const GltfPath path = list / i;
@@ -219,6 +225,7 @@ private:
             SceneAnimation& animation = scene_.animations.emplace_back();
             animation.name = source.name;
             std::vector<std::pair<uint32_t, ScenePath>> moved;
+            animation.channels.reserve(source.channels.size());
             for (size_t k = 0; k < source.channels.size(); k++) {
                 const GltfPath place = channels / k;
                 if (source.channels[k].target_path == "pointer") continue;  // of an extension, or of no node
@@ -290,6 +297,7 @@ private:
 
     Status cameras() {
         const GltfPath list = root_ / "cameras";
+        scene_.cameras.reserve(model_.cameras.size());
         for (size_t i = 0; i < model_.cameras.size(); i++) {
             const tinygltf::Camera& source = model_.cameras[i];
             SceneCamera& camera = scene_.cameras.emplace_back();
@@ -319,6 +327,7 @@ private:
         const GltfPath extensions = root_ / "extensions";
         const GltfPath punctual = extensions / "KHR_lights_punctual";
         const GltfPath list = punctual / "lights";
+        scene_.lights.reserve(model_.lights.size());
         for (size_t i = 0; i < model_.lights.size(); i++) {
             const tinygltf::Light& source = model_.lights[i];
             SceneLight& light = scene_.lights.emplace_back();

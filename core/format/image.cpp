@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cstring>
+#include <exception>
 
 namespace glint {
 
@@ -137,7 +138,13 @@ Expected<Image> Image::create(Format format, uint32_t width, uint32_t height, ui
     image.format_ = format;
     image.width_ = width;
     image.height_ = height;
-    image.bytes_.resize(texels * info.block_size);
+    try {
+        image.bytes_.resize(texels * info.block_size);
+    } catch (const std::exception&) {
+        return unexpected(makeError(ErrorCode::OutOfMemory, "image.out_of_memory",
+                                    "{}x{} texels of {} take {} bytes, which are not there", width, height, info.name,
+                                    texels * info.block_size));
+    }
     return image;
 }
 

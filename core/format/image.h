@@ -23,7 +23,7 @@ public:
     Image() = default;
 
     /// An image of zeros. Errors: "image.size_zero", "image.format" (unknown or compressed), "image.too_large" (more
-    /// than `limit` bytes).
+    /// than `limit` bytes), "image.out_of_memory".
     static Expected<Image> create(Format format, uint32_t width, uint32_t height, uint64_t limit = default_limit);
 
     /// An image of the given texels. Errors: those above and "image.data_size" (not width * height texels).

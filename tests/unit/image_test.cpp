@@ -102,6 +102,7 @@ TEST(Image, CreateErrors) {
     EXPECT_THAT(Image::create(FormatUnknown, 4, 4), HasErrorId("image.format"));
     EXPECT_THAT(Image::create(FormatBC7RGBAu8n, 4, 4), HasErrorId("image.format"));
     EXPECT_THAT(Image::create(FormatRGBAf32, UINT32_MAX, UINT32_MAX), HasErrorId("image.too_large"));
+    EXPECT_THAT(Image::create(FormatRu8n, UINT32_MAX, UINT32_MAX, ~0ull), HasErrorId("image.out_of_memory"));
     EXPECT_THAT(Image::create(FormatRu8n, 4, 4, 16), IsOk());
     EXPECT_THAT(Image::create(FormatRu8n, 4, 4, 15), HasErrorId("image.too_large"));
     const std::vector<std::byte> data(15);

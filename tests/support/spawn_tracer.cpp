@@ -25,6 +25,7 @@ layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
 #define TYPE rayQueryGetIntersectionTypeEXT
 #define DISTANCE rayQueryGetIntersectionTEXT
 #define PRIMITIVE rayQueryGetIntersectionPrimitiveIndexEXT
+#define INSTANCE rayQueryGetIntersectionInstanceIdEXT
 #define BARYCENTRICS rayQueryGetIntersectionBarycentricsEXT
 #define TO_WORLD rayQueryGetIntersectionObjectToWorldEXT
 #define TO_OBJECT rayQueryGetIntersectionWorldToObjectEXT
@@ -36,6 +37,7 @@ layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
 #define TYPE glintQueryType
 #define DISTANCE glintQueryT
 #define PRIMITIVE glintQueryPrimitiveIndex
+#define INSTANCE glintQueryInstanceId
 #define BARYCENTRICS glintQueryBarycentrics
 #define TO_WORLD glintQueryObjectToWorld
 #define TO_OBJECT glintQueryWorldToObject
@@ -108,6 +110,12 @@ void main() {
         while (PROCEED(q)) {}
         if (uint(TYPE(q, true)) == 0u) continue;
         const uint primitive = uint(PRIMITIVE(q, true));
+        if (mode == 3u) {
+            primitives[0] = primitive;
+            result.second = uint(INSTANCE(q, true));
+            result.t = DISTANCE(q, true);
+            break;
+        }
         if (turn == 2u) {
             result.second = primitive;
             result.t = DISTANCE(q, true);
@@ -189,18 +197,18 @@ std::vector<SpawnCase> spawnCases() {
     };
     const auto uniform = [&](float size) { return turned(scale(Vector3f(size))); };
     return {
-        {"identity", soup, Transform3x4()},
-        {"object far", triangleSoup({1000.0, -700.0, 300.0}), Transform3x4()},
-        {"turned", soup, uniform(1.0f)},
-        {"scaled 1e-4", soup, moved(1, 2, -3, uniform(1e-4f))},
-        {"scaled 1e4", soup, moved(100, 20, -3, uniform(1e4f))},
-        {"stretched", soup, moved(1, 2, -3, turned(scale({1, 1, 1000})))},
-        {"squashed", soup, moved(1, 2, -3, turned(scale({1, 1, 1e-3f})))},
-        {"mirrored", soup, moved(1, 2, -3, turned(scale({1, -1, 1})))},
-        {"moved 1e7", soup, moved(1e7f, -1e7f, 0.7e7f, uniform(1.0f))},
-        {"moved 1e7, scaled 1e4", soup, moved(1e7f, -1e7f, 0.7e7f, uniform(1e4f))},
-        {"mirrored, stretched, moved, object far", triangleSoup({30.0, -7.0, 10.0}),
-         moved(1e4f, -2e4f, 3e3f, turned(scale({1, -30, 300})))},
+        {"identity", soup, {Transform3x4()}},
+        {"object far", triangleSoup({1000.0, -700.0, 300.0}), {Transform3x4()}},
+        {"turned", soup, {uniform(1.0f)}},
+        {"scaled 1e-4", soup, {moved(1, 2, -3, uniform(1e-4f))}},
+        {"scaled 1e4", soup, {moved(100, 20, -3, uniform(1e4f))}},
+        {"stretched", soup, {moved(1, 2, -3, turned(scale({1, 1, 1000})))}},
+        {"squashed", soup, {moved(1, 2, -3, turned(scale({1, 1, 1e-3f})))}},
+        {"mirrored", soup, {moved(1, 2, -3, turned(scale({1, -1, 1})))}},
+        {"moved 1e7", soup, {moved(1e7f, -1e7f, 0.7e7f, uniform(1e3f))}},
+        {"mirrored, stretched, moved, object far",
+         triangleSoup({30.0, -7.0, 10.0}),
+         {moved(1e4f, -2e4f, 3e3f, turned(scale({1, -30, 300})))}},
     };
 }
 
@@ -212,7 +220,7 @@ std::vector<SpawnSample> spawnSamples(const SpawnCase& scene, uint32_t count, ui
         Vector3d corners[3];
         for (uint64_t i = 0; i < 3; i++)
             corners[i] =
-                transformed(scene.transform, Vector3d(scene.mesh.positions[scene.mesh.indices[3 * triangle + i]]));
+                transformed(scene.transforms[0], Vector3d(scene.mesh.positions[scene.mesh.indices[3 * triangle + i]]));
         double u = random.uniform();
         double v = random.uniform();
         if (u + v > 1.0) {
@@ -260,23 +268,28 @@ std::vector<SpawnResult> SpawnTracer::trace(const SpawnCase& scene, std::span<co
         bottom.addVertexBuffer(static_cast<uint32_t>(scene.mesh.positions.size()), FormatRGBf32, 12, positions);
         bottom.addIndexBuffer(static_cast<uint32_t>(scene.mesh.indices.size()), FormatRu32, indices);
         need(bottom.create(Tracing::TypeTriangle));
-        Tracing::Instance instance;
-        std::memcpy(instance.transform, scene.transform.rows.data(), sizeof(instance.transform));
-        instance.tracing = &bottom;
-        top = device_.createTracing(std::vector<Tracing::Instance>{instance});
+        std::vector<Tracing::Instance> instances(scene.transforms.size());
+        for (size_t i = 0; i < instances.size(); i++) {
+            std::memcpy(instances[i].transform, scene.transforms[i].rows.data(), sizeof(instances[i].transform));
+            instances[i].tracing = &bottom;
+        }
+        top = device_.createTracing(instances);
         need(device_.buildTracings({bottom, top}));
         compute.setTracing(0, top);
     } else {
         using namespace detail;
         const Hierarchy model = hierarchyOf(scene.mesh);
-        HierarchyInstance instance;
-        instance.transform = scene.transform;
-        instance.bounds = boundsOf(model);
+        std::vector<HierarchyInstance> list(scene.transforms.size());
+        for (size_t i = 0; i < list.size(); i++) {
+            list[i].transform = scene.transforms[i];
+            list[i].bounds = boundsOf(model);
+        }
         const auto build = [&] {
-            return std::move(
-                *need(buildHierarchy(std::span<const HierarchyInstance>(&instance, 1), BuildMode::Quality)));
+            return std::move(*need(buildHierarchy(std::span<const HierarchyInstance>(list), BuildMode::Quality)));
         };
-        instance.texel = static_cast<uint32_t>(build().texels.size());
+        // The model follows the instances, whose size does not depend on where it is.
+        const auto place = static_cast<uint32_t>(build().texels.size());
+        for (HierarchyInstance& instance : list) instance.texel = place;
         const Hierarchy instances = build();
         std::vector<Texel> all(instances.texels.begin(), instances.texels.end());
         all.insert(all.end(), model.texels.begin(), model.texels.end());

@@ -14,16 +14,19 @@
 
 namespace glint::test {
 
-/// A mesh and the transform of its one instance.
+/// A mesh and the transforms of its instances, mostly one.
 struct SpawnCase {
     std::string name;
     Mesh mesh;
-    Transform3x4 transform;
+    std::vector<Transform3x4> transforms;
 };
 
 /// Triangles of all shapes, each in a cell of its own, under hard transforms: scaled 1e-4 and 1e4, stretched and
 /// squashed 1:1000, mirrored, moved to 1e7, with object coordinates far from the origin.
 std::vector<SpawnCase> spawnCases();
+/// Number of the soup's triangles that are no needles and not flat: those whose number is divisible by three. Their
+/// sides are at most this long, and none is narrower than an eighth of it.
+constexpr float fat_triangle_side = 0.125f;
 
 /// A primary ray, and where to go from its hit: an angle around the normal, and the sine of the elevation over the
 /// plane, negative to go through it.
@@ -34,8 +37,8 @@ struct SpawnSample {
     float elevation = 0.0f;
 };
 
-/// At random points of random triangles from random sides; elevations from 2^-30 to 1, their logarithms evenly
-/// distributed, one of eight negative.
+/// At random points of random triangles of the first instance from random sides; elevations from 2^-30 to 1, their
+/// logarithms evenly distributed, one of eight negative.
 std::vector<SpawnSample> spawnSamples(const SpawnCase& scene, uint32_t count, uint64_t seed);
 
 struct SpawnResult {
@@ -64,6 +67,7 @@ enum class SpawnMode : uint32_t {
     Corners,  ///< surfacePoint by corners and barycentrics
     Ray,      ///< surfacePoint by origin + t * direction
     Segment,  ///< from the hit of each sample to the hit of the next one
+    Primary,  ///< nothing but the primary ray: first is the triangle, second the instance, t the distance
 };
 
 class SpawnTracer {

@@ -16,9 +16,6 @@
 #include <glint/tracing/ray_query.h>
 #include <glint/tracing/traversal.h>
 
-// Of a hierarchy, as in core/tracing/detail/hierarchy.h.
-const uint GLINT_KIND_BOXES = 1u;
-
 // Both levels' lists.
 #define GLINT_QUERY_STACK (2 * GLINT_TRACING_STACK + 1)
 uint glint_query_nodes[GLINT_TRACING_QUERIES][GLINT_QUERY_STACK];
@@ -121,25 +118,6 @@ void glintQueryEnterNode(inout GlintQuery query) {
     glintQueryNext(query);
 }
 
-// Rows of a 3x4 matrix that begins at a texel.
-mat4x3 glintQueryMatrix(uint texel) {
-    return transpose(mat3x4(uintBitsToFloat(GLINT_TRACING_LOAD(texel)), uintBitsToFloat(GLINT_TRACING_LOAD(texel + 1u)),
-                            uintBitsToFloat(GLINT_TRACING_LOAD(texel + 2u))));
-}
-
-vec3 glintQueryToObject(uint instance, vec3 world, bool is_point) {
-    const mat4x3 inverse = glintQueryMatrix(instance + 3u);
-    precise vec3 v = world;
-    if (is_point) {
-        // Less the instance's place first: what is near to it keeps its digits.
-        v = world - vec3(uintBitsToFloat(GLINT_TRACING_LOAD(instance).w),
-                         uintBitsToFloat(GLINT_TRACING_LOAD(instance + 1u).w),
-                         uintBitsToFloat(GLINT_TRACING_LOAD(instance + 2u).w));
-    }
-    precise vec3 object = inverse[0] * v.x + inverse[1] * v.y + inverse[2] * v.z;
-    return object;
-}
-
 void glintQueryEnterInstance(inout GlintQuery query) {
     const uint record = query.space.records + 3u * glintChildRecord(query.header, query.slot);
     const uint index = GLINT_TRACING_LOAD(record + 2u).y;
@@ -158,8 +136,8 @@ void glintQueryEnterInstance(inout GlintQuery query) {
     query.instance_index = index;
     query.instance_flags = data.z >> 24;
     query.kind = kind;
-    query.space = glintSpace(data.x, glintQueryToObject(instance, query.origin, true),
-                             glintQueryToObject(instance, query.direction, false));
+    query.space = glintSpace(data.x, glintToObject(instance, query.origin, true),
+                             glintToObject(instance, query.direction, false));
     glintQueryRoot(query);
 }
 
@@ -296,16 +274,16 @@ uint glintQueryInstanceOffset(GlintQuery query, bool committed) {
     return GLINT_TRACING_LOAD(glintQueryInstance(query, committed) + 6u).z & 0xffffffu;
 }
 mat4x3 glintQueryObjectToWorld(GlintQuery query, bool committed) {
-    return glintQueryMatrix(glintQueryInstance(query, committed));
+    return glintMatrix(glintQueryInstance(query, committed));
 }
 mat4x3 glintQueryWorldToObject(GlintQuery query, bool committed) {
-    return glintQueryMatrix(glintQueryInstance(query, committed) + 3u);
+    return glintMatrix(glintQueryInstance(query, committed) + 3u);
 }
 vec3 glintQueryObjectRayOrigin(GlintQuery query, bool committed) {
-    return glintQueryToObject(glintQueryInstance(query, committed), query.origin, true);
+    return glintToObject(glintQueryInstance(query, committed), query.origin, true);
 }
 vec3 glintQueryObjectRayDirection(GlintQuery query, bool committed) {
-    return glintQueryToObject(glintQueryInstance(query, committed), query.direction, false);
+    return glintToObject(glintQueryInstance(query, committed), query.direction, false);
 }
 float glintQueryTMin(GlintQuery query) { return query.t_min; }
 uint glintQueryFlags(GlintQuery query) { return query.flags; }

@@ -7,6 +7,10 @@
 // Entries of the stack: a hierarchy has 24 levels at most, and the last one pushes nothing.
 #define GLINT_TRACING_STACK 23
 
+// Of a hierarchy, as in core/tracing/detail/hierarchy.h.
+const uint GLINT_KIND_TRIANGLES = 0u;
+const uint GLINT_KIND_BOXES = 1u;
+
 // The slot that ends a list of children, and a list of nothing else.
 #define GLINT_TRACING_NONE 15u
 #define GLINT_TRACING_EMPTY 0xffffffffu
@@ -237,4 +241,24 @@ bool glintIsBefore(GlintTriangleHit a, GlintTriangleHit b) {
     const uint geometry_a = a.geometry & 0x7fffffffu;
     const uint geometry_b = b.geometry & 0x7fffffffu;
     return geometry_a < geometry_b || (geometry_a == geometry_b && a.primitive < b.primitive);
+}
+
+// Rows of a 3x4 matrix that begins at a texel.
+mat4x3 glintMatrix(uint texel) {
+    return transpose(mat3x4(uintBitsToFloat(GLINT_TRACING_LOAD(texel)), uintBitsToFloat(GLINT_TRACING_LOAD(texel + 1u)),
+                            uintBitsToFloat(GLINT_TRACING_LOAD(texel + 2u))));
+}
+
+// To the space of the instance whose texels begin at `instance`.
+vec3 glintToObject(uint instance, vec3 world, bool is_point) {
+    const mat4x3 inverse = glintMatrix(instance + 3u);
+    precise vec3 v = world;
+    if (is_point) {
+        // Less the instance's place first: what is near to it keeps its digits.
+        v = world - vec3(uintBitsToFloat(GLINT_TRACING_LOAD(instance).w),
+                         uintBitsToFloat(GLINT_TRACING_LOAD(instance + 1u).w),
+                         uintBitsToFloat(GLINT_TRACING_LOAD(instance + 2u).w));
+    }
+    precise vec3 object = inverse[0] * v.x + inverse[1] * v.y + inverse[2] * v.z;
+    return object;
 }

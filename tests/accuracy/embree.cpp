@@ -37,7 +37,7 @@ void copyIn(RTCGeometry geometry, RTCBufferType type, RTCFormat format, const st
     std::memcpy(place, values.data(), values.size() * sizeof(T));
 }
 
-RayHit closestHit(RTCScene scene, const Ray& ray) {
+RayHit closestHit(RTCScene scene, const Ray& ray, uint32_t* instance) {
     RTCRayHit query = {};
     query.ray.org_x = ray.origin.x;
     query.ray.org_y = ray.origin.y;
@@ -64,6 +64,7 @@ RayHit closestHit(RTCScene scene, const Ray& ray) {
         const float facing = found.Ng_x * ray.direction.x + found.Ng_y * ray.direction.y + found.Ng_z * ray.direction.z;
         hit = {query.ray.tfar, found.primID, 0, found.u, found.v, facing < 0.0f ? 1u : 0u};
     }
+    if (instance != nullptr) *instance = query.hit.instID[0];
     return hit;
 }
 
@@ -71,21 +72,40 @@ RayHit closestHit(RTCScene scene, const Ray& ray) {
 
 struct EmbreeScene::Handles {
     Holder<RTCDevice> device;
+    Holder<RTCScene> model;  ///< of instances
     Holder<RTCScene> scene;
+
+    RTCScene createScene(EmbreeMode mode) const {
+        RTCScene made = rtcNewScene(device.get());
+        rtcSetSceneFlags(made, mode == EmbreeMode::Robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+        rtcSetSceneBuildQuality(made, RTC_BUILD_QUALITY_MEDIUM);
+        return made;
+    }
 };
 
-EmbreeScene::EmbreeScene(const Mesh& mesh, EmbreeMode mode) : handles_(std::make_unique<Handles>()) {
+EmbreeScene::EmbreeScene(const Mesh& mesh, EmbreeMode mode, std::span<const Transform3x4> instances)
+    : handles_(std::make_unique<Handles>()) {
     handles_->device.reset(rtcNewDevice(nullptr));
-    handles_->scene.reset(rtcNewScene(handles_->device.get()));
+    handles_->scene.reset(handles_->createScene(mode));
     RTCScene scene = handles_->scene.get();
-    rtcSetSceneFlags(scene, mode == EmbreeMode::Robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-    rtcSetSceneBuildQuality(scene, RTC_BUILD_QUALITY_MEDIUM);
     const Holder<RTCGeometry> geometry(rtcNewGeometry(handles_->device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
     copyIn(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh.positions, sizeof(Vector3f));
     copyIn(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.indices, 3 * sizeof(uint32_t));
     rtcCommitGeometry(geometry.get());
     rtcAttachGeometry(scene, geometry.get());
     rtcCommitScene(scene);
+    if (instances.empty()) return;
+
+    handles_->model = std::move(handles_->scene);
+    handles_->scene.reset(handles_->createScene(mode));
+    for (const Transform3x4& transform : instances) {
+        const Holder<RTCGeometry> instance(rtcNewGeometry(handles_->device.get(), RTC_GEOMETRY_TYPE_INSTANCE));
+        rtcSetGeometryInstancedScene(instance.get(), handles_->model.get());
+        rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, transform.rows.data());
+        rtcCommitGeometry(instance.get());
+        rtcAttachGeometry(handles_->scene.get(), instance.get());
+    }
+    rtcCommitScene(handles_->scene.get());
 }
 
 EmbreeScene::~EmbreeScene() = default;
@@ -96,13 +116,14 @@ std::vector<RayHit> EmbreeScene::cast(std::span<const Ray> rays) const {
     return hits;
 }
 
-void EmbreeScene::cast(std::span<const Ray> rays, std::span<RayHit> hits, uint32_t threads) const {
+void EmbreeScene::cast(std::span<const Ray> rays, std::span<RayHit> hits, uint32_t threads,
+                       std::span<uint32_t> instances) const {
     constexpr size_t chunk = 4096;
     std::atomic<size_t> next = 0;
     const auto work = [&] {
         for (size_t begin = next.fetch_add(chunk); begin < rays.size(); begin = next.fetch_add(chunk))
             for (size_t i = begin; i < std::min(rays.size(), begin + chunk); i++)
-                hits[i] = closestHit(handles_->scene.get(), rays[i]);
+                hits[i] = closestHit(handles_->scene.get(), rays[i], instances.empty() ? nullptr : &instances[i]);
     };
     std::vector<std::thread> others;
     for (uint32_t i = 1; i < threads; i++) others.emplace_back(work);

@@ -1,5 +1,6 @@
 #include "bench/tracing_scenes.h"
 
+#include "05_hello_tracing/scene.h"
 #include "accuracy/embree.h"
 #include "support/reference.h"
 
@@ -52,12 +53,11 @@ uint32_t evenBits(uint32_t x) {
     return result;
 }
 
-std::vector<Ray> cameraRays() {
-    const Vector3f eye(0.3f, 1.9f, 2.3f);
-    const Vector3f forward = glm::normalize(-eye);
-    const Vector3f right = glm::normalize(glm::cross(forward, Vector3f(0, 1, 0)));
+std::vector<Ray> cameraRays(const Vector3f& eye, const Vector3f& target, const Vector3f& up_axis, float degrees) {
+    const Vector3f forward = glm::normalize(target - eye);
+    const Vector3f right = glm::normalize(glm::cross(forward, up_axis));
     const Vector3f up = glm::cross(right, forward);
-    const float extent = std::tan(radians(55.0f) / 2);
+    const float extent = std::tan(radians(degrees) / 2);
     std::vector<Ray> rays(size_t(size) * size);
     for (uint32_t i = 0; i < rays.size(); i++) {
         const float x = (static_cast<float>(evenBits(i)) + 0.5f) * (2.0f / size) - 1.0f;
@@ -68,20 +68,31 @@ std::vector<Ray> cameraRays() {
     return rays;
 }
 
-std::vector<Ray> bounceRays(const Mesh& mesh, std::span<const Ray> rays) {
+std::vector<Ray> bounceRays(const TracingScene& scene) {
+    const Mesh& mesh = scene.mesh;
+    const std::vector<Ray>& rays = scene.camera;
     std::vector<RayHit> hits(rays.size());
-    test::EmbreeScene(mesh, test::EmbreeMode::Robust).cast(rays, hits, 2);
+    std::vector<uint32_t> instances(rays.size());
+    test::EmbreeScene(mesh, test::EmbreeMode::Robust, scene.instances).cast(rays, hits, 2, instances);
     test::Random random(1);
-    std::vector<Ray> result(rays.size());
+    std::vector<Ray> result;
+    result.reserve(rays.size());
     for (size_t i = 0; i < rays.size(); i++) {
-        if (!hits[i].isHit()) throw std::runtime_error("a camera ray leaves the room");
-        const uint32_t* corner = &mesh.indices[3 * size_t(hits[i].primitive)];
-        const Vector3f a = mesh.positions[corner[0]];
-        Vector3f normal = glm::normalize(glm::cross(mesh.positions[corner[1]] - a, mesh.positions[corner[2]] - a));
+        if (!hits[i].isHit()) continue;
+        Vector3f corners[3];
+        for (size_t c = 0; c < 3; c++) {
+            corners[c] = mesh.positions[mesh.indices[3 * size_t(hits[i].primitive) + c]];
+            if (!scene.instances.empty())
+                corners[c] = transformPoint(scene.instances[instances[i]].matrix(), corners[c]);
+        }
+        Vector3f normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
         if (glm::dot(normal, rays[i].direction) > 0.0f) normal = -normal;
-        result[i].origin = rays[i].origin + rays[i].direction * hits[i].t + normal * 1e-4f;
-        const Vector3f direction = normal * 1.0001f + Vector3f(random.direction());
-        result[i].direction = glm::normalize(direction);
+        // Far beyond the rounding of the hit, far below the size of what is seen.
+        const float offset = scene.instances.empty() ? 1e-4f : 1e-3f;
+        Ray ray;
+        ray.origin = rays[i].origin + rays[i].direction * hits[i].t + normal * offset;
+        ray.direction = glm::normalize(normal * 1.0001f + Vector3f(random.direction()));
+        result.push_back(ray);
     }
     return result;
 }
@@ -91,10 +102,19 @@ std::vector<Ray> bounceRays(const Mesh& mesh, std::span<const Ray> rays) {
 TracingScene makeTracingScene(const std::string& name) {
     TracingScene scene;
     scene.name = name;
-    scene.mesh = name == "bunny" ? bunny() : bumpyTorus(name == "1m" ? 500 : 158);
-    append(scene.mesh, createBox(Vector3f(6.0f)));
-    scene.camera = cameraRays();
-    scene.bounce = bounceRays(scene.mesh, scene.camera);
+    if (name == "instances") {
+        const InstancedScene places = *check(InstancedScene::load({}, false));
+        scene.mesh = places.mesh();
+        scene.instances = places.transforms(0.0f);
+        scene.camera = cameraRays(places.camera(0.0f, 1.0f).position(), places.target(), Vector3f(0, 0, 1), 60.0f);
+    } else {
+        scene.mesh = name == "bunny" ? bunny() : bumpyTorus(name == "1m" ? 500 : 158);
+        append(scene.mesh, createBox(Vector3f(6.0f)));
+        scene.camera = cameraRays(Vector3f(0.3f, 1.9f, 2.3f), Vector3f(0.0f), Vector3f(0, 1, 0), 55.0f);
+    }
+    scene.bounce = bounceRays(scene);
+    if (scene.instances.empty() && scene.bounce.size() != scene.camera.size())
+        throw std::runtime_error("a camera ray leaves the room");
     return scene;
 }
 

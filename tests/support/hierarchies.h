@@ -7,6 +7,7 @@
 #include <glint/format/mesh.h>
 #include <glint/tracing/detail/device_build.h>
 #include <glint/tracing/detail/hierarchy.h>
+#include <glint/tracing/detail/instances.h>
 
 #include <stdexcept>
 #include <utility>
@@ -58,6 +59,28 @@ inline Mesh soup(uint32_t triangles, uint64_t seed, double size = 1.0, double of
         }
     }
     return mesh;
+}
+
+/// A top level over instances of one hierarchy, and that hierarchy behind it. The masks are 0xff.
+inline std::vector<detail::Texel> instancesOf(const detail::Hierarchy& model, std::span<const Transform3x4> transforms,
+                                              ThreadPool* pool = nullptr) {
+    std::vector<detail::HierarchyInstance> instances(transforms.size());
+    const auto top = [&](uint32_t texel) {
+        for (size_t i = 0; i < instances.size(); i++) {
+            instances[i].transform = transforms[i];
+            instances[i].bounds = boundsOf(model);
+            instances[i].texel = texel;
+        }
+        Expected<detail::Hierarchy> hierarchy = detail::buildHierarchy(
+            std::span<const detail::HierarchyInstance>(instances), detail::BuildMode::Quality, pool);
+        if (!hierarchy) throw std::runtime_error(hierarchy.error().text());
+        return std::move(*hierarchy);
+    };
+    // Its size does not depend on where the model is.
+    const detail::Hierarchy hierarchy = top(static_cast<uint32_t>(top(0).texels.size()));
+    std::vector<detail::Texel> texels(hierarchy.texels.begin(), hierarchy.texels.end());
+    texels.insert(texels.end(), model.texels.begin(), model.texels.end());
+    return texels;
 }
 
 }  // namespace glint::test

@@ -42,14 +42,24 @@ Ray rayTo(const Vector3d& origin, const Vector3d& target) {
 
 class TracingTraversal : public DeviceTest {
 protected:
-    std::vector<RayHit> trace(const Hierarchy& hierarchy, std::vector<Ray> rays, bool refill, uint32_t memory = 0) {
+    std::vector<RayHit> trace(const Hierarchy& hierarchy, const std::vector<Ray>& rays, bool refill,
+                              uint32_t memory = 0) {
+        std::vector<RayHit> hits;
+        for (const BatchHit& each :
+             trace(std::span(hierarchy.texels.data(), hierarchy.texels.size()), rays, 1, refill, memory))
+            hits.push_back(each.hit);
+        return hits;
+    }
+
+    std::vector<BatchHit> trace(std::span<const Texel> hierarchies, const std::vector<Ray>& rays, uint32_t levels,
+                                bool refill, uint32_t memory = 0) {
         Kernel kernel = device.createKernel();
-        kernel.createShaderGLSL("#include <glint/tracing/batch.h>\n",
-                                fmt::format("GLINT_TRACING_MEMORY={};GLINT_TRACING_REFILL={};GLINT_TRACING_RAYS=4",
-                                            memory, refill ? 1 : 0));
+        kernel.createShaderGLSL(
+            "#include <glint/tracing/batch.h>\n",
+            fmt::format("GLINT_TRACING_MEMORY={};GLINT_TRACING_LEVELS={};GLINT_TRACING_REFILL={};GLINT_TRACING_RAYS=4",
+                        memory, levels, refill ? 1 : 0));
         EXPECT_TRUE(kernel.create()) << kernel.error().text();
-        const Buffer texels =
-            device.createBuffer(Buffer::FlagTexel | Buffer::FlagStorage, hierarchy.texels.data(), hierarchy.bytes());
+        const Buffer texels = device.createBuffer(Buffer::FlagTexel | Buffer::FlagStorage, hierarchies);
         const Buffer ray_buffer = device.createBuffer(Buffer::FlagStorage, std::span(rays));
         const Buffer hit_buffer = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit));
         device.clearBuffer(hit_buffer, 0x12345678u);
@@ -66,11 +76,9 @@ protected:
         compute.dispatch(refill ? (count + 3) / 4 : count);
         const Status status = device.submit(compute);
         EXPECT_TRUE(status) << status.error().text();
-        std::vector<RayHit> hits;
         const Expected<std::vector<BatchHit>> results = device.read<BatchHit>(hit_buffer);
         if (!results) ADD_FAILURE() << results.error().text();
-        for (const BatchHit& each : results.value_or(std::vector<BatchHit>())) hits.push_back(each.hit);
-        return hits;
+        return results.value_or(std::vector<BatchHit>());
     }
 };
 
@@ -252,6 +260,27 @@ TEST_F(TracingTraversal, KeepsToTheIntervalAndTheOrderOfTies) {
     }
 }
 
+/// A top level, and the models behind it. The instances' texels are the models' numbers.
+std::vector<Texel> sceneOf(std::vector<HierarchyInstance> instances, std::span<const Hierarchy> models) {
+    for (HierarchyInstance& instance : instances) instance.bounds = boundsOf(models[instance.texel]);
+    const auto top = [&] {
+        return std::move(*buildHierarchy(std::span<const HierarchyInstance>(instances), BuildMode::Quality));
+    };
+    // Its size does not depend on where the models are.
+    size_t end = top().texels.size();
+    std::vector<uint32_t> places;
+    for (const Hierarchy& model : models) {
+        places.push_back(static_cast<uint32_t>(end));
+        end += model.texels.size();
+    }
+    for (HierarchyInstance& instance : instances) instance.texel = places[instance.texel];
+    std::vector<Texel> all;
+    const auto append = [&](const Hierarchy& each) { all.insert(all.end(), each.texels.begin(), each.texels.end()); };
+    append(top());
+    for (const Hierarchy& model : models) append(model);
+    return all;
+}
+
 // One kernel for both engines: the library's calls, or GL_EXT_ray_query's.
 constexpr const char* query_source = R"(
 #if DRIVER
@@ -430,8 +459,7 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
         HierarchyInstance instance;
         const Vector3f where(place(), place(), place());
         instance.transform = Transform3x4(translate(where) * rotateX(angle()) * rotateY(angle()) * scale(size));
-        instance.bounds = boundsOf(models[model]);
-        instance.texel = model;  // its place follows
+        instance.texel = model;
         instance.custom_index = 1000 + i;
         instance.mask = 1u << i % 8;
         instance.offset = 7 * i;
@@ -450,21 +478,7 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
     Tracing driver_scene = device.createTracing(driver_instances);
     ASSERT_TRUE(device.buildTracings({driver_models[0], driver_models[1], driver_models[2], driver_scene}));
 
-    // The scene first, then the models. Its size does not depend on where they are.
-    const auto top_texels = [&] {
-        return std::move(*buildHierarchy(std::span<const HierarchyInstance>(instances), BuildMode::Quality));
-    };
-    size_t end = top_texels().texels.size();
-    std::vector<uint32_t> places;
-    for (const Hierarchy& model : models) {
-        places.push_back(static_cast<uint32_t>(end));
-        end += model.texels.size();
-    }
-    for (HierarchyInstance& instance : instances) instance.texel = places[instance.texel];
-    std::vector<Texel> all;
-    const auto append = [&](const Hierarchy& each) { all.insert(all.end(), each.texels.begin(), each.texels.end()); };
-    append(top_texels());
-    for (const Hierarchy& model : models) append(model);
+    const std::vector<Texel> all = sceneOf(instances, models);
     const Buffer texels = device.createBuffer(Buffer::FlagTexel, std::span(all));
 
     Kernel kernels[2];
@@ -540,6 +554,84 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
         EXPECT_LE(differ, rays.size() / 1000) << detail;
         EXPECT_EQ(met > 100, each.mask != 0) << met;
     }
+}
+
+TEST_F(TracingTraversal, TracesInstancesInBatches) {
+    const float box[6] = {-0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f};
+    BoxGeometry boxes;
+    boxes.boxes = reinterpret_cast<const std::byte*>(box);
+    boxes.count = 1;
+    std::vector<Hierarchy> models;
+    models.push_back(buildMesh(createTorus(0.4f, 0.15f, 16, 8)));
+    models.push_back(buildMesh(createSphere(0.5f, 1)));
+    models.push_back(std::move(*buildHierarchy(std::span<const BoxGeometry>(&boxes, 1), BuildMode::Quality)));
+
+    // Turned, stretched, mirrored and flipped; some cannot be seen, some are twice in the same place.
+    Random random(24);
+    std::vector<HierarchyInstance> instances;
+    for (uint32_t i = 0; i < 200; i++) {
+        const auto at = [&](double most) { return static_cast<float>(random.uniform(-most, most)); };
+        HierarchyInstance instance;
+        const Matrix4x4f turn = rotateX(at(180.0)) * rotateY(at(180.0));
+        const Vector3f size(0.6f + at(0.5), 0.6f + at(0.5), i % 4 == 0 ? -0.7f : 0.7f);
+        instance.transform = Transform3x4(translate(Vector3f(at(2.0), at(2.0), at(2.0))) * turn * scale(size));
+        instance.texel = i % 3;
+        instance.mask = i % 7 == 0 ? 0u : 1u << i % 8;
+        if (i % 5 == 0) instance.flags = Tracing::InstanceFlipFacing;
+        instances.push_back(instance);
+        if (i % 9 == 0) instances.push_back(instance);
+    }
+    const std::vector<Texel> scene = sceneOf(instances, models);
+    std::vector<Ray> rays;
+    for (uint32_t i = 0; i < 3001; i++) {
+        Ray ray = rayTo(4.0 * random.direction(), 2.0 * random.direction());
+        ray.t_min = i % 4 == 0 ? 0.5f : 0.0f;
+        if (i % 5 == 0) ray.t_max = 1.0f;
+        rays.push_back(ray);
+    }
+
+    // What a query finds that sees all masks and takes all triangles.
+    Kernel kernel = device.createKernel();
+    kernel.createShaderGLSL(query_source, "DRIVER=0;GLINT_TRACING_MEMORY=0");
+    ASSERT_TRUE(kernel.create()) << kernel.error().text();
+    const Buffer texels = device.createBuffer(Buffer::FlagTexel, std::span(scene));
+    const Buffer ray_buffer = device.createBuffer(Buffer::FlagStorage, std::span(rays));
+    const Buffer hits = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(QueryHit));
+    Compute compute = device.createCompute();
+    compute.setKernel(kernel);
+    constexpr uint32_t opaque_without_boxes = 1 | 512;
+    compute.setUniform(0, std::array<uint32_t, 4>{static_cast<uint32_t>(rays.size()), opaque_without_boxes, 0xff, 0});
+    compute.setTexelBuffer(0, texels, FormatRGBAu32);
+    compute.setStorageBuffers(0, {ray_buffer, hits});
+    compute.dispatch(static_cast<uint32_t>(rays.size()));
+    ASSERT_TRUE(device.submit(compute));
+    const std::vector<QueryHit> expected = *device.read<QueryHit>(hits);
+
+    for (const bool refill : {false, true}) {
+        const std::vector<BatchHit> found = trace(scene, rays, 2, refill);
+        ASSERT_EQ(found.size(), expected.size());
+        uint32_t met = 0;
+        uint32_t twice = 0;
+        for (size_t i = 0; i < rays.size(); i++) {
+            const RayHit& hit = found[i].hit;
+            ASSERT_EQ(hit.isHit(), expected[i].type != 0) << "ray " << i;
+            if (!hit.isHit()) continue;
+            met++;
+            twice += found[i].instance + 1 < instances.size() &&
+                             instances[found[i].instance].transform == instances[found[i].instance + 1].transform
+                         ? 1
+                         : 0;
+            // The same arithmetic, so the same bits.
+            ASSERT_EQ(found[i].instance, expected[i].instance) << "ray " << i;
+            ASSERT_EQ(hit.primitive, expected[i].primitive) << "ray " << i;
+            ASSERT_EQ(hit.t, expected[i].t) << "ray " << i;
+            ASSERT_EQ(Vector2f(hit.u, hit.v), expected[i].barycentrics) << "ray " << i;
+            ASSERT_EQ(hit.front, expected[i].front) << "ray " << i;
+        }
+        EXPECT_GT(met, rays.size() / 4);
+        EXPECT_GT(twice, 20u);
+    }
+    EXPECT_FALSE(trace(sceneOf({}, {}), {rays[0]}, 2, false)[0].hit.isHit());
 }
 
 }  // namespace

@@ -16,11 +16,6 @@
 #include <glint/tracing/ray_query.h>
 #include <glint/tracing/traversal.h>
 
-// Both levels' lists.
-#define GLINT_QUERY_STACK (2 * GLINT_TRACING_STACK + 1)
-uint glint_query_nodes[GLINT_TRACING_QUERIES][GLINT_QUERY_STACK];
-uint glint_query_lists[GLINT_TRACING_QUERIES][GLINT_QUERY_STACK];
-
 struct GlintIntersection {
     uint type;
     float t;
@@ -42,34 +37,16 @@ struct GlintQuery {
     GlintIntersection candidate;
     GlintIntersection committed;  // its t is where the ray ends
 
+    GlintWay way;
     GlintSpace top;
-    GlintSpace space;  // of the level that the ray is at
-    uint node;         // whose children are in `list`
-    uvec2 header;      // its words 2 and 3
-    uint list;         // what is left of them after `slot`
-    uint slot;         // the child to go to; NONE when there is none left at this level
-    uint stacked;
-    uint bottom;          // entries of the top level when the ray is within an instance
-    bool inside;          // of an instance
-    uint instance;        // texel of it
-    uint instance_index;  // and its place in the list
-    uint instance_flags;
-    uint kind;  // of its hierarchy
+    bool inside;       // of an instance
+    GlintSpace space;  // the ray in its hierarchy
+    GlintInstance instance;
 };
 
 void glintQueryTerminate(inout GlintQuery query) {
-    query.slot = GLINT_TRACING_NONE;
-    query.list = GLINT_TRACING_EMPTY;
-    query.stacked = 0u;
-    query.bottom = 0u;
+    glintEnd(query.way);
     query.inside = false;
-}
-
-void glintQueryRoot(inout GlintQuery query) {
-    query.node = 0u;
-    query.header = uvec2(0x100u, 0u);  // child 0 is node 1
-    query.list = GLINT_TRACING_EMPTY;
-    query.slot = 0u;
 }
 
 void glintQueryInitialize(out GlintQuery query, uint number, uint top, uint flags, uint mask, vec3 origin, float t_min,
@@ -84,69 +61,22 @@ void glintQueryInitialize(out GlintQuery query, uint number, uint top, uint flag
     query.committed = GlintIntersection(GLINT_COMMITTED_NONE, t_max, vec2(0.0), 0u, 0u, 0u, false, false);
     query.top = glintSpace(top, origin, direction);
     query.space = query.top;
-    query.instance = 0u;
-    query.instance_index = 0u;
-    query.instance_flags = 0u;
-    query.kind = 0u;
+    query.instance = GlintInstance(0u, 0u, 0u, 0u, 0u, 0u);
     glintQueryTerminate(query);
-    if (glintIsRay(origin, direction, t_min, t_max)) glintQueryRoot(query);
-}
-
-void glintQueryNext(inout GlintQuery query) {
-    if (query.list == GLINT_TRACING_EMPTY && query.stacked > query.bottom) {
-        query.stacked--;
-        query.list = glint_query_lists[query.number][query.stacked];
-        query.node = glint_query_nodes[query.number][query.stacked];
-        query.header = GLINT_TRACING_LOAD(query.space.base + 4u * query.node).zw;
-    }
-    query.slot = glintFirst(query.list);
-    query.list = glintRest(query.list);
-}
-
-// What is left of this node's children waits on the stack.
-void glintQueryPush(inout GlintQuery query) {
-    if (query.list == GLINT_TRACING_EMPTY) return;
-    glint_query_nodes[query.number][query.stacked] = query.node;
-    glint_query_lists[query.number][query.stacked] = query.list;
-    query.stacked++;
-}
-
-void glintQueryEnterNode(inout GlintQuery query) {
-    glintQueryPush(query);
-    query.node = glintChildNode(query.header, query.slot);
-    query.list = glintNode(query.space, query.node, query.t_min, query.committed.t, query.header);
-    glintQueryNext(query);
+    if (glintIsRay(origin, direction, t_min, t_max)) glintBegin(query.way);
 }
 
 void glintQueryEnterInstance(inout GlintQuery query) {
-    const uint record = query.space.records + 3u * glintChildRecord(query.header, query.slot);
-    const uint index = GLINT_TRACING_LOAD(record + 2u).y;
-    const uint instance = query.top.base + GLINT_TRACING_LOAD(query.top.base + 3u).w + 8u * index;
-    const uvec4 data = GLINT_TRACING_LOAD(instance + 6u);
-    const uint kind = GLINT_TRACING_LOAD(data.x + 2u).w;
-    const uint skipped = kind == GLINT_KIND_BOXES ? GLINT_RAY_SKIP_BOXES : GLINT_RAY_SKIP_TRIANGLES;
-    if ((data.y >> 24 & query.mask) == 0u || (query.flags & skipped) != 0u) {
-        glintQueryNext(query);
+    query.instance = glintInstanceAt(query.top, query.way);
+    const uint skipped = query.instance.kind == GLINT_KIND_BOXES ? GLINT_RAY_SKIP_BOXES : GLINT_RAY_SKIP_TRIANGLES;
+    if ((query.instance.mask & query.mask) == 0u || (query.flags & skipped) != 0u) {
+        glintNext(query.way, query.number, query.top.base);
         return;
     }
-    glintQueryPush(query);
-    query.bottom = query.stacked;
     query.inside = true;
-    query.instance = instance;
-    query.instance_index = index;
-    query.instance_flags = data.z >> 24;
-    query.kind = kind;
-    query.space = glintSpace(data.x, glintToObject(instance, query.origin, true),
-                             glintToObject(instance, query.direction, false));
-    glintQueryRoot(query);
-}
-
-void glintQueryLeaveInstance(inout GlintQuery query) {
-    query.inside = false;
-    query.bottom = 0u;
-    query.space = query.top;
-    query.list = GLINT_TRACING_EMPTY;
-    glintQueryNext(query);
+    query.space = glintInstanceSpace(query.instance, query.origin, query.direction);
+    glintPush(query.way, query.number);
+    glintBegin(query.way);
 }
 
 void glintQueryCommit(inout GlintQuery query, uint type) {
@@ -157,8 +87,8 @@ void glintQueryCommit(inout GlintQuery query, uint type) {
 
 bool glintQueryIsOpaque(GlintQuery query, uint geometry) {
     bool opaque = (geometry & 0x80000000u) != 0u;
-    if ((query.instance_flags & GLINT_INSTANCE_OPAQUE) != 0u) opaque = true;
-    if ((query.instance_flags & GLINT_INSTANCE_NO_OPAQUE) != 0u) opaque = false;
+    if ((query.instance.flags & GLINT_INSTANCE_OPAQUE) != 0u) opaque = true;
+    if ((query.instance.flags & GLINT_INSTANCE_NO_OPAQUE) != 0u) opaque = false;
     if ((query.flags & GLINT_RAY_OPAQUE) != 0u) opaque = true;
     if ((query.flags & GLINT_RAY_NO_OPAQUE) != 0u) opaque = false;
     return opaque;
@@ -175,12 +105,12 @@ bool glintQueryIsBefore(GlintIntersection a, GlintIntersection b) {
 }
 
 // True if the leaf is a candidate that the caller has to decide on.
-bool glintQueryEnterLeaf(inout GlintQuery query) {
-    const uint record = glintChildRecord(query.header, query.slot);
+bool glintQueryEnterLeaf(inout GlintQuery query, GlintSpace space) {
+    const uint record = glintChildRecord(query.way.header, query.way.slot);
     GlintIntersection next;
-    next.instance = query.instance_index;
-    if (query.kind == GLINT_KIND_BOXES) {
-        const uvec4 last = GLINT_TRACING_LOAD(query.space.records + 3u * record + 2u);
+    next.instance = query.instance.index;
+    if (query.instance.kind == GLINT_KIND_BOXES) {
+        const uvec4 last = GLINT_TRACING_LOAD(space.records + 3u * record + 2u);
         next.type = GLINT_CANDIDATE_BOX;
         next.t = 0.0;
         next.barycentrics = vec2(0.0);
@@ -188,36 +118,35 @@ bool glintQueryEnterLeaf(inout GlintQuery query) {
         next.geometry = last.z & 0x7fffffffu;
         next.front = false;
         next.opaque = glintQueryIsOpaque(query, last.z);
-        glintQueryNext(query);
+        glintNext(query.way, query.number, space.base);
         if (glintQueryCullsOpacity(query, next.opaque)) return false;
         query.candidate = next;
         return true;
     }
 
     GlintTriangleHit hit;
-    bool met = glintTriangle(query.space, record, hit);
+    bool met = glintTriangle(space, record, hit);
     next.type = GLINT_CANDIDATE_TRIANGLE;
     next.t = hit.t;
     next.barycentrics = hit.weights.yz / hit.area;
     next.primitive = hit.primitive;
     next.geometry = hit.geometry & 0x7fffffffu;
     // Seen along z, with x to the right, y is down: clockwise triangles have the positive area.
-    next.front = hit.area < 0.0 != ((query.instance_flags & GLINT_INSTANCE_FLIP_FACING) != 0u);
+    next.front = hit.area < 0.0 != ((query.instance.flags & GLINT_INSTANCE_FLIP_FACING) != 0u);
     next.opaque = glintQueryIsOpaque(query, hit.geometry);
     met = met && hit.t > query.t_min && !glintQueryCullsOpacity(query, next.opaque);
     met = met && (hit.t < query.committed.t ||
                   (query.committed.type != GLINT_COMMITTED_NONE && hit.t == query.committed.t &&
                    glintQueryIsBefore(next, query.committed)));
     const uint culled = next.front ? GLINT_RAY_CULL_FRONT : GLINT_RAY_CULL_BACK;
-    if ((query.instance_flags & GLINT_INSTANCE_CULL_DISABLE) == 0u) met = met && (query.flags & culled) == 0u;
-    if (met) {
+    if ((query.instance.flags & GLINT_INSTANCE_CULL_DISABLE) == 0u) met = met && (query.flags & culled) == 0u;
+    if (met && next.opaque) {
+        query.committed = next;
+        query.committed.type = GLINT_COMMITTED_TRIANGLE;
+    } else if (met) {
         query.candidate = next;
-        if (next.opaque) {
-            query.committed = next;
-            query.committed.type = GLINT_COMMITTED_TRIANGLE;
-        }
     }
-    glintQueryNext(query);
+    glintNext(query.way, query.number, space.base);
     if (met && next.opaque && (query.flags & GLINT_RAY_TERMINATE) != 0u) glintQueryTerminate(query);
     return met && !next.opaque;
 }
@@ -225,15 +154,22 @@ bool glintQueryEnterLeaf(inout GlintQuery query) {
 // Goes on to the next candidate that the caller has to decide on. False when there is none.
 bool glintQueryProceed(inout GlintQuery query) {
     bool asks = false;
-    while (!asks && (query.slot != GLINT_TRACING_NONE || query.inside)) {
-        if (query.slot != GLINT_TRACING_NONE && !glintIsLeaf(query.header, query.slot)) glintQueryEnterNode(query);
-        if (query.slot == GLINT_TRACING_NONE) {
-            if (query.inside) glintQueryLeaveInstance(query);
-        } else if (glintIsLeaf(query.header, query.slot)) {
-            if (query.inside)
-                asks = glintQueryEnterLeaf(query);
-            else
-                glintQueryEnterInstance(query);
+    while (!asks && (query.way.slot != GLINT_TRACING_NONE || query.inside)) {
+        // All lanes go on to an instance, and then through their instances together, so that what is the same for all
+        // of an instance's nodes stays where it is.
+        while (query.way.slot != GLINT_TRACING_NONE && !query.inside) {
+            if (glintAtNode(query.way))
+                glintEnterNode(query.way, query.number, query.top, query.t_min, query.committed.t);
+            if (glintAtLeaf(query.way)) glintQueryEnterInstance(query);
+        }
+        const GlintSpace space = query.space;
+        while (query.way.slot != GLINT_TRACING_NONE && !asks) {
+            if (glintAtNode(query.way)) glintEnterNode(query.way, query.number, space, query.t_min, query.committed.t);
+            if (glintAtLeaf(query.way)) asks = glintQueryEnterLeaf(query, space);
+        }
+        if (query.inside && !asks) {
+            query.inside = false;
+            glintLeave(query.way, query.number, query.top.base);
         }
     }
     return asks;

@@ -1,11 +1,20 @@
-// Glint's own hierarchies in a shader: a ray against one of them, the tests of a node's boxes and of a triangle. For
-// what is built on this: batch.h and query.h. docs/tracing.md derives the bounds.
+// Glint's own hierarchies in a shader: a ray against one of them, the tests of a node's boxes and of a triangle, and the
+// way from node to node. For what is built on this: batch.h and query.h. docs/tracing.md derives the bounds.
 //
 // GLINT_TRACING_LOAD(i) has to be defined before: see memory.h.
 #pragma once
 
-// Entries of the stack: a hierarchy has 24 levels at most, and the last one pushes nothing.
-#define GLINT_TRACING_STACK 23
+// Levels of hierarchies: 2 where instances are traced.
+#ifndef GLINT_TRACING_LEVELS
+#define GLINT_TRACING_LEVELS 2
+#endif
+// Rays that may be on their way at once in a thread.
+#ifndef GLINT_TRACING_QUERIES
+#define GLINT_TRACING_QUERIES 1
+#endif
+// Entries of the stack: a hierarchy has 24 levels of nodes at most, and the last one pushes nothing; but the instances
+// beside the one that the ray is within wait too.
+#define GLINT_TRACING_STACK (24 * GLINT_TRACING_LEVELS - 1)
 
 // Of a hierarchy, as in core/tracing/detail/hierarchy.h.
 const uint GLINT_KIND_TRIANGLES = 0u;
@@ -243,6 +252,70 @@ bool glintIsBefore(GlintTriangleHit a, GlintTriangleHit b) {
     return geometry_a < geometry_b || (geometry_a == geometry_b && a.primitive < b.primitive);
 }
 
+// The way of a ray through a hierarchy. What waits for it is on the stack, beside the structure: an array in it would be
+// copied at every call.
+struct GlintWay {
+    uint node;     // whose children are in `list`
+    uvec2 header;  // its words 2 and 3
+    uint list;     // what is left of them after `slot`
+    uint slot;     // the child to go to; NONE when there is none left
+    uint stacked;  // entries of the stack
+    uint bottom;   // and those of the level above
+};
+
+uint glint_stack_nodes[GLINT_TRACING_QUERIES][GLINT_TRACING_STACK];
+uint glint_stack_lists[GLINT_TRACING_QUERIES][GLINT_TRACING_STACK];
+
+// To the root, above what is on the stack.
+void glintBegin(inout GlintWay way) {
+    way.node = 0u;
+    way.header = uvec2(0x100u, 0u);  // child 0 is node 1
+    way.list = GLINT_TRACING_EMPTY;
+    way.slot = 0u;
+    way.bottom = way.stacked;
+}
+
+void glintEnd(out GlintWay way) { way = GlintWay(0u, uvec2(0u), GLINT_TRACING_EMPTY, GLINT_TRACING_NONE, 0u, 0u); }
+
+bool glintAtNode(GlintWay way) { return way.slot != GLINT_TRACING_NONE && !glintIsLeaf(way.header, way.slot); }
+bool glintAtLeaf(GlintWay way) { return way.slot != GLINT_TRACING_NONE && glintIsLeaf(way.header, way.slot); }
+
+// To the next child: of this node, or of the last one that has children left. (Keeping on the stack where these begin,
+// and passing over what lies beyond the closest hit, takes more time than it saves: docs/tracing.md.)
+void glintNext(inout GlintWay way, uint number, uint base) {
+    if (way.list == GLINT_TRACING_EMPTY && way.stacked > way.bottom) {
+        way.stacked--;
+        way.list = glint_stack_lists[number][way.stacked];
+        way.node = glint_stack_nodes[number][way.stacked];
+        way.header = GLINT_TRACING_LOAD(base + 4u * way.node).zw;
+    }
+    way.slot = glintFirst(way.list);
+    way.list = glintRest(way.list);
+}
+
+// What is left of this node's children waits on the stack.
+void glintPush(inout GlintWay way, uint number) {
+    if (way.list == GLINT_TRACING_EMPTY) return;
+    glint_stack_nodes[number][way.stacked] = way.node;
+    glint_stack_lists[number][way.stacked] = way.list;
+    way.stacked++;
+}
+
+void glintEnterNode(inout GlintWay way, uint number, GlintSpace space, float t_min, float t_max) {
+    glintPush(way, number);
+    way.node = glintChildNode(way.header, way.slot);
+    way.list = glintNode(space, way.node, t_min, t_max, way.header);
+    glintNext(way, number, space.base);
+}
+
+// From the root of an instance's hierarchy, with nothing left there, back to the level above, whose texels begin at
+// `base`.
+void glintLeave(inout GlintWay way, uint number, uint base) {
+    way.list = GLINT_TRACING_EMPTY;
+    way.bottom = 0u;
+    glintNext(way, number, base);
+}
+
 // Rows of a 3x4 matrix that begins at a texel.
 mat4x3 glintMatrix(uint texel) {
     return transpose(mat3x4(uintBitsToFloat(GLINT_TRACING_LOAD(texel)), uintBitsToFloat(GLINT_TRACING_LOAD(texel + 1u)),
@@ -261,4 +334,38 @@ vec3 glintToObject(uint instance, vec3 world, bool is_point) {
     }
     precise vec3 object = inverse[0] * v.x + inverse[1] * v.y + inverse[2] * v.z;
     return object;
+}
+
+// An instance, as in core/tracing/detail/instances.h.
+struct GlintInstance {
+    uint index;  // its place in the list
+    uint texel;  // its first
+    uint base;   // the first texel of its hierarchy
+    uint kind;   // of that
+    uint mask;
+    uint flags;
+};
+
+GlintInstance glintInstance(uint top, uint index) {
+    GlintInstance instance;
+    instance.index = index;
+    instance.texel = top + GLINT_TRACING_LOAD(top + 3u).w + 8u * index;
+    const uvec4 data = GLINT_TRACING_LOAD(instance.texel + 6u);
+    instance.base = data.x;
+    instance.kind = GLINT_TRACING_LOAD(data.x + 2u).w;
+    instance.mask = data.y >> 24;
+    instance.flags = data.z >> 24;
+    return instance;
+}
+
+// That of a top level's leaf.
+GlintInstance glintInstanceAt(GlintSpace top, GlintWay way) {
+    const uint record = top.records + 3u * glintChildRecord(way.header, way.slot);
+    return glintInstance(top.base, GLINT_TRACING_LOAD(record + 2u).y);
+}
+
+// A ray in an instance's space.
+GlintSpace glintInstanceSpace(GlintInstance instance, vec3 origin, vec3 direction) {
+    return glintSpace(instance.base, glintToObject(instance.texel, origin, true),
+                      glintToObject(instance.texel, direction, false));
 }

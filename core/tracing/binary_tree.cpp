@@ -204,10 +204,18 @@ private:
         node.left = left;
         node.right = right;
         tree_.heights[index] = static_cast<uint8_t>(1 + std::max(tree_.height(left), tree_.height(right)));
+        // The cheapest distribution of i + 2 children to the two sides, for all i at once.
+        const float* left_costs = collapseCosts(tree_, left);
+        const float* right_costs = collapseCosts(tree_, right);
+        float cheapest[CollapseCost::count];
+        for (uint32_t i = 0; i < CollapseCost::count; i++) cheapest[i] = left_costs[0] + right_costs[i];
+        for (uint32_t l = 1; l < CollapseCost::count; l++) {
+            for (uint32_t i = l; i < CollapseCost::count; i++)
+                cheapest[i] = std::min(cheapest[i], left_costs[l] + right_costs[i - l]);
+        }
         float* costs = tree_.costs[index].costs;
-        costs[0] = distribute(tree_, node, CollapseCost::count + 1).cost + halfArea(box, tree_.area_scale);
-        for (uint32_t i = 2; i <= CollapseCost::count; i++)
-            costs[i - 1] = std::min(costs[i - 2], distribute(tree_, node, i).cost);
+        costs[0] = cheapest[CollapseCost::count - 1] + halfArea(box, tree_.area_scale);
+        for (uint32_t i = 1; i < CollapseCost::count; i++) costs[i] = std::min(costs[i - 1], cheapest[i - 1]);
     }
 
     Box4 centers(const Range& range) {

@@ -83,6 +83,7 @@ Node encodeNode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t le
     Node node = {};
     uint32_t origins[3] = {};
     uint32_t exponents[3] = {};
+    constexpr double units[4] = {1.0, 0x1p-8, 0x1p-16, 0x1p-24};
     const double step = grid.step;
     const double inverse_step = 1.0 / step;
     const int step_exponent = static_cast<int>(std::bit_cast<uint64_t>(step) >> 52) - 1023;
@@ -106,21 +107,24 @@ Node encodeNode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t le
         const double inverse = 1.0 / scale;
         origins[axis] = static_cast<uint32_t>(origin);
         exponents[axis] = static_cast<uint32_t>(exponent - 1 - step_exponent + exponent_bias);
-        for (uint32_t s = 0; s < count; s++) {
-            const bool empty = !(lo[s][axis] <= hi[s][axis]);
-            const double low = empty ? all_lo[axis] : lo[s][axis];
-            const double high = empty ? all_lo[axis] : hi[s][axis];
-            const uint32_t shift = 8 * (s & 3);
+        // A byte depends on those before it in its word, which makes one long chain of each word: two at a time.
+        for (uint32_t byte = 0; byte < 4; byte++) {
+            const uint32_t shift = 8 * byte;
             const uint32_t before = (1u << shift) - 1;
-            const double unit = 1.0 / static_cast<double>(1u << shift);
-            const double low_part = (planes[s / 4] & before) * unit;
-            auto below = static_cast<int32_t>((low - base) * inverse - low_part);
-            below -= base + (below + low_part) * scale > low ? 1 : 0;
-            const double high_part = (planes[2 + s / 4] & before) * unit;
-            auto above = static_cast<int32_t>((high - base) * inverse - high_part);
-            above += base + (above + high_part) * scale < high ? 1 : 0;
-            planes[s / 4] |= (static_cast<uint32_t>(below) ^ 128u) << shift;
-            planes[2 + s / 4] |= (static_cast<uint32_t>(above) ^ 128u) << shift;
+            const double unit = units[byte];
+            for (uint32_t s = byte; s < count; s += 4) {
+                const bool empty = !(lo[s][axis] <= hi[s][axis]);
+                const double low = empty ? all_lo[axis] : lo[s][axis];
+                const double high = empty ? all_lo[axis] : hi[s][axis];
+                const double low_part = static_cast<int32_t>(planes[s / 4] & before) * unit;
+                const double high_part = static_cast<int32_t>(planes[2 + s / 4] & before) * unit;
+                auto below = static_cast<int32_t>((low - base) * inverse - low_part);
+                below -= base + (below + low_part) * scale > low ? 1 : 0;
+                auto above = static_cast<int32_t>((high - base) * inverse - high_part);
+                above += base + (above + high_part) * scale < high ? 1 : 0;
+                planes[s / 4] |= (static_cast<uint32_t>(below) ^ 128u) << shift;
+                planes[2 + s / 4] |= (static_cast<uint32_t>(above) ^ 128u) << shift;
+            }
         }
     }
     node.words[0] = origins[0] | exponents[0] << 20 | (origins[2] & 255u) << 24;

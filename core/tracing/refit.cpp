@@ -14,57 +14,57 @@ public:
         : hierarchy_(hierarchy), geometries_(geometries), pool_(pool), boxes_(size_t(hierarchy.nodes) + 1) {}
 
     void run() {
+        const Box4 bounds = readAll();
+        const Grid grid = makeGrid(bounds);
+        writeHeader(hierarchy_, grid, bounds);
         // Children come after their parents, and those of a run's nodes are in the run itself; so backwards, the runs
         // before the top.
         const std::vector<uint32_t>& runs = hierarchy_.runs;
-        parallelFor(pool_, runs.size() - 2, [&](size_t i) { measure(runs[i + 1], runs[i + 2]); });
-        measure(runs[0], runs[1]);
-        const Grid grid = makeGrid(boxes_[1]);
-        writeHeader(hierarchy_, grid, boxes_[1]);
-        parallelRanges(pool_, hierarchy_.nodes, 1024, [&](size_t begin, size_t end) { encode(grid, begin, end); });
+        parallelFor(pool_, runs.size() - 2, [&](size_t i) { encode(grid, runs[i + 1], runs[i + 2]); });
+        encode(grid, runs[0], runs[1]);
     }
 
 private:
-    Node node(size_t place) const {
-        Node node;
-        std::memcpy(&node, &hierarchy_.texels[4 * (place + 1)], sizeof(Node));
-        return node;
-    }
-    Texel* recordAt(uint32_t i) { return &hierarchy_.texels[hierarchy_.firstRecord() + 3 * size_t(i)]; }
+    Texel* recordAt(size_t i) { return &hierarchy_.texels[hierarchy_.firstRecord() + 3 * i]; }
 
-    /// Reads the primitives of the nodes [begin, end) again, and finds the boxes of the nodes.
-    void measure(size_t begin, size_t end) {
-        for (size_t place = end; place-- > begin;) {
-            const Node node = this->node(place);
+    /// Takes the coordinates of all primitives, and returns their box. The grid has to be known before the first node
+    /// is encoded; and in a loop of its own a read need not wait for the one before, wherever the corners are.
+    Box4 readAll() {
+        constexpr size_t grain = 4096;
+        std::vector<Box4> boxes((hierarchy_.records + grain - 1) / grain);
+        parallelRanges(pool_, hierarchy_.records, grain, [&](size_t begin, size_t end) {
             Box4 box;
-            for (uint32_t s = 0; s < node.leaves(); s++) {
+            for (size_t i = begin; i < end; i++) {
                 Record record;
-                std::memcpy(&record, recordAt(node.record() + s), sizeof(Record));
+                std::memcpy(&record, recordAt(i), sizeof(Record));
                 Reader::read(geometries_[record.geometry & ~Record::opaque_bit], record.primitive, record.values);
-                std::memcpy(recordAt(node.record() + s), &record, sizeof(Record));
+                std::memcpy(recordAt(i), record.values, sizeof(record.values));
                 if (Reader::active(record.values)) box.add(Reader::box(record.values));
             }
-            const uint32_t children = node.children();
-            for (uint32_t s = node.leaves(); s < children; s++) box.add(boxes_[node.child(s)]);
-            boxes_[place + 1] = box;
-        }
+            boxes[begin / grain] = box;
+        });
+        Box4 bounds;
+        for (const Box4& box : boxes) bounds.add(box);
+        return bounds;
     }
 
     void encode(const Grid& grid, size_t begin, size_t end) {
-        for (size_t place = begin; place < end; place++) {
-            const Node old = node(place);
-            const uint32_t children = old.children();
+        for (size_t place = end; place-- > begin;) {
+            Node node;
+            std::memcpy(&node, &hierarchy_.texels[4 * (place + 1)], sizeof(Node));
+            const uint32_t children = node.children();
+            const uint32_t leaves = node.leaves();
             Box4 boxes[node_width];
-            for (uint32_t s = 0; s < children; s++) {
-                if (s >= old.leaves()) {
-                    boxes[s] = boxes_[old.child(s)];
-                    continue;
-                }
-                Record record;
-                std::memcpy(&record, recordAt(old.record() + s), sizeof(Record));
-                if (Reader::active(record.values)) boxes[s] = Reader::box(record.values);
+            for (uint32_t s = 0; s < leaves; s++) {
+                float values[9];
+                std::memcpy(values, recordAt(node.record() + s), sizeof(values));
+                if (Reader::active(values)) boxes[s] = Reader::box(values);
             }
-            const Node encoded = encodeNode(grid, boxes, children, old.leaves(), old.child(old.leaves()), old.record());
+            for (uint32_t s = leaves; s < children; s++) boxes[s] = boxes_[node.child(s)];
+            Box4 all;
+            for (uint32_t s = 0; s < children; s++) all.add(boxes[s]);
+            boxes_[place + 1] = all;
+            const Node encoded = encodeNode(grid, boxes, children, leaves, node.child(leaves), node.record());
             std::memcpy(&hierarchy_.texels[4 * (place + 1)], &encoded, sizeof(Node));
         }
     }

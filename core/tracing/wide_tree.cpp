@@ -99,20 +99,25 @@ private:
             children.items[children.count++] = item;
             return;
         }
-        while (true) {
-            if (most == 1) {
-                children.items[children.count++] = item;
-                return;
-            }
-            const Distribution best = distribute(tree_, nodeOf(item), most);
-            if (most <= CollapseCost::count && collapseCost(tree_, item.child, most - 1) <= best.cost) {
-                most--;
-                continue;
-            }
-            collect(leftOf(item), best.left, children);
-            collect(rightOf(item), most - best.left, children);
+        const float* costs = collapseCosts(tree_, item.child);
+        while (most > 1 && most <= CollapseCost::count && costs[most - 1] == costs[most - 2]) most--;
+        if (most == 1) {
+            children.items[children.count++] = item;
             return;
         }
+        const float* left_costs = collapseCosts(tree_, nodeOf(item).left);
+        const float* right_costs = collapseCosts(tree_, nodeOf(item).right);
+        uint32_t best = 1;
+        float best_cost = left_costs[0] + right_costs[most - 2];
+        for (uint32_t left = 2; left < most; left++) {
+            const float cost = left_costs[left - 1] + right_costs[most - left - 1];
+            if (cost < best_cost) {
+                best = left;
+                best_cost = cost;
+            }
+        }
+        collect(leftOf(item), best, children);
+        collect(rightOf(item), most - best, children);
     }
 
     void openHighest(const Item& item, Children& children) const {

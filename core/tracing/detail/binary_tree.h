@@ -78,21 +78,10 @@ BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mo
 /// Sorts the refs along a Z-order curve of 10 bits an axis and returns their codes.
 Array<uint32_t> sortByCode(Array<PrimRef>& refs, const Box4& bounds, ThreadPool* pool);
 
-/// Cheapest way to give a parent i children of the two subtrees: how many of them come from the left one.
-struct Distribution {
-    float cost;
-    uint32_t left;
-};
-inline float collapseCost(const BinaryTree& tree, BinaryChild child, uint32_t i) {
-    return child.isLeaf() ? 0.0f : tree.costs[child.index()].costs[i - 1];
-}
-inline Distribution distribute(const BinaryTree& tree, const BinaryNode& node, uint32_t i) {
-    Distribution best = {collapseCost(tree, node.left, 1) + collapseCost(tree, node.right, i - 1), 1};
-    for (uint32_t left = 2; left < i; left++) {
-        const float cost = collapseCost(tree, node.left, left) + collapseCost(tree, node.right, i - left);
-        if (cost < best.cost) best = {cost, left};
-    }
-    return best;
+/// Costs of a child for 1 to CollapseCost::count children given to its parent: a leaf costs nothing.
+inline const float* collapseCosts(const BinaryTree& tree, BinaryChild child) {
+    static constexpr CollapseCost nothing = {};
+    return child.isLeaf() ? nothing.costs : tree.costs[child.index()].costs;
 }
 
 }  // namespace glint::detail

@@ -16,6 +16,11 @@ struct Float4 {
     __m128 v;
 
     static Float4 load(const float* p) { return {_mm_loadu_ps(p)}; }
+    /// Three, and 0. By pieces as they were written, if they were just now: a load waits for stores that it spans.
+    static Float4 load3(const float* p) {
+        const __m128i first = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(p));
+        return {_mm_movelh_ps(_mm_castsi128_ps(first), _mm_load_ss(p + 2))};
+    }
     static Float4 all(float x) { return {_mm_set1_ps(x)}; }
     void store(float* p) const { _mm_storeu_ps(p, v); }
     friend Float4 operator+(Float4 a, Float4 b) { return {_mm_add_ps(a.v, b.v)}; }
@@ -33,6 +38,7 @@ struct Float4 {
     float v[4];
 
     static Float4 load(const float* p) { return {{p[0], p[1], p[2], p[3]}}; }
+    static Float4 load3(const float* p) { return {{p[0], p[1], p[2], 0.0f}}; }
     static Float4 all(float x) { return {{x, x, x, x}}; }
     void store(float* p) const {
         for (int i = 0; i < 4; i++) p[i] = v[i];

@@ -30,11 +30,6 @@ inline bool allInRange(const float* values, uint32_t count) {
     return all;
 }
 
-inline Float4 load3(const float* p) {
-    const float padded[4] = {p[0], p[1], p[2], 0.0f};
-    return Float4::load(padded);
-}
-
 struct TriangleReader {
     using Geometry = TriangleGeometry;
     static constexpr Hierarchy::Kind kind = Hierarchy::Kind::Triangles;
@@ -71,7 +66,7 @@ struct TriangleReader {
     static bool active(const float values[9]) { return allInRange(values, 9); }
     static Box4 box(const float values[9]) {
         Box4 box;
-        for (uint32_t i = 0; i < 3; i++) box.add(load3(values + size_t(3 * i)));
+        for (uint32_t i = 0; i < 3; i++) box.add(Float4::load3(values + size_t(3 * i)));
         return box;
     }
     static Error rangeError(const Geometry& geometry, size_t g, uint32_t primitive) {
@@ -101,7 +96,7 @@ struct BoxReader {
     static bool active(const float values[9]) {
         return allInRange(values, 6) && values[0] <= values[3] && values[1] <= values[4] && values[2] <= values[5];
     }
-    static Box4 box(const float values[9]) { return {load3(values), load3(values + 3)}; }
+    static Box4 box(const float values[9]) { return {Float4::load3(values), Float4::load3(values + 3)}; }
     static Error rangeError(const Geometry&, size_t, uint32_t) { return {}; }
 };
 

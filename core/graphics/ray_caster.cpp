@@ -2,17 +2,17 @@
 
 #include <glint/base/format_error.h>
 #include <glint/geometry/triangle_order.h>
+#include <glint/graphics/detail/piece_size.h>
 
 #include <algorithm>
 #include <array>
-#include <cstring>
-#include <numeric>
+#include <chrono>
 
 namespace glint {
 
 namespace {
 
-static_assert(sizeof(Ray) == 32 && sizeof(RayHit) == 24);
+static_assert(sizeof(Ray) == 32 && sizeof(RayHit) == 28);
 
 // Floats are judged by their bits: compilers of shaders may assume that there is no NaN. Scaling the direction by a
 // power of two, so that its largest component lies in [1, 2), and t by the inverse, is exact, and keeps the driver's
@@ -23,7 +23,7 @@ layout(local_size_x = 64) in;
 layout(binding = 0) uniform accelerationStructureEXT scene;
 layout(binding = 1, std430) readonly buffer Rays { vec4 rays[]; };
 layout(binding = 2, std430) writeonly buffer Hits { uint hits[]; };
-layout(push_constant) uniform Push { uint count; };
+layout(push_constant) uniform Push { uint count, mask; };
 
 const uint infinity = 0x7f800000u;
 
@@ -58,14 +58,14 @@ void main() {
 #else
         uint flags = gl_RayFlagsOpaqueEXT;
 #endif
-        rayQueryInitializeEXT(query, scene, flags, 0xff, origin.xyz, t_min, direction.xyz * scale, t_max);
+        rayQueryInitializeEXT(query, scene, flags, mask, origin.xyz, t_min, direction.xyz * scale, t_max);
         while (rayQueryProceedEXT(query)) {}
         hit = rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionNoneEXT;
     }
 #if ANY
     hits[i] = hit ? 1u : 0u;
 #else
-    uint place = i * 6u;
+    uint place = i * 7u;
     vec2 barycentrics = vec2(0.0);
     if (hit) barycentrics = rayQueryGetIntersectionBarycentricsEXT(query, true);
     hits[place] = hit ? floatBitsToUint(rayQueryGetIntersectionTEXT(query, true) * scale) : infinity;
@@ -74,6 +74,7 @@ void main() {
     hits[place + 3u] = floatBitsToUint(barycentrics.x);
     hits[place + 4u] = floatBitsToUint(barycentrics.y);
     hits[place + 5u] = hit && rayQueryGetIntersectionFrontFaceEXT(query, true) ? 1u : 0u;
+    hits[place + 6u] = hit ? uint(rayQueryGetIntersectionInstanceIdEXT(query, true)) : 0xffffffffu;
 #endif
 }
 )";
@@ -102,57 +103,137 @@ Triangles sortedTriangles(const Mesh& mesh) {
     return triangles;
 }
 
-/// What one chunk travels in.
+/// What one piece travels in.
 struct Batch {
     Buffer rays;
     Buffer results;
     Fence fence;
+    Query time;          ///< null on a device without time queries
     uint32_t count = 0;  ///< 0 while idle
+    std::chrono::steady_clock::time_point begin;
 };
+
+/// A kernel, and how fast it is.
+struct Pass {
+    Kernel kernel;
+    detail::PieceSize pieces;
+};
+
+/// One of the meshes on the device, and what its triangles are called.
+struct Model {
+    Tracing tracing;
+    Vector3f center = Vector3f(0.0f);
+    std::vector<uint32_t> numbers;
+    std::vector<uint32_t> part_begins;  ///< in triangles
+    std::vector<uint32_t> part_ends;
+
+    void name(RayHit& hit) const {
+        hit.primitive = numbers[hit.primitive];
+        hit.geometry = 0;
+        if (part_ends.empty()) return;
+        const auto part = std::upper_bound(part_ends.begin(), part_ends.end(), hit.primitive);
+        const auto place = static_cast<size_t>(part - part_ends.begin());
+        const bool inside = part != part_ends.end() && part_begins[place] <= hit.primitive;
+        hit.geometry = static_cast<uint32_t>(inside ? place : part_ends.size());
+    }
+};
+
+/// The numbers of the instances in an order in which those that are near in space are near in memory, for the same
+/// reason as with triangles, and by the same sort: of triangles without extent at their centres.
+std::vector<uint32_t> sortedInstances(std::span<const Model> models, std::span<const MeshInstance> instances) {
+    Mesh centers;
+    for (uint32_t i = 0; i < instances.size(); i++) {
+        centers.positions.push_back(transformPoint(instances[i].transform.matrix(), models[instances[i].mesh].center));
+        centers.indices.insert(centers.indices.end(), 3, i);
+    }
+    return sortTriangles(centers);
+}
+
+Status checkInstances(size_t meshes, std::span<const MeshInstance> instances) {
+    if (instances.empty())
+        return makeError(ErrorCode::InvalidArgument, "caster.instances", "there are no instances to cast rays at");
+    for (size_t i = 0; i < instances.size(); i++) {
+        const MeshInstance& instance = instances[i];
+        if (instance.mesh >= meshes)
+            return makeError(ErrorCode::OutOfRange, "caster.mesh", "instance {} is of mesh {}, there are {}", i,
+                             instance.mesh, meshes);
+        if (!isInvertible(instance.transform))
+            return makeError(ErrorCode::InvalidArgument, "caster.transform",
+                             "the transform of instance {} is not finite, or makes a plane, a line or a point of its "
+                             "mesh",
+                             i);
+        if (instance.mask > 0xff)
+            return makeError(ErrorCode::OutOfRange, "caster.mask", "the mask of instance {} is {:#x}; it has 8 bits", i,
+                             instance.mask);
+    }
+    return {};
+}
 
 }  // namespace
 
 struct RayCaster::State {
     Device device;
-    Tracing model;
+    std::vector<Model> models;
+    std::vector<MeshInstance> instances;  ///< as they lie in the scene; each has an index
     Tracing scene;
-    Kernel closest;
-    Kernel any;
+    Pass closest;
+    Pass any;
     std::array<Batch, 2> batches;
-    std::vector<uint32_t> numbers;
-    std::vector<uint32_t> part_begins;  ///< in triangles
-    std::vector<uint32_t> part_ends;
     uint32_t room = chunk;
+    uint32_t mask = 0xff;
 
-    Status build(const Mesh& mesh);
-    Status prepare(Kernel& kernel, const char* macros);
+    Status addModel(const Mesh& mesh);
+    Status build(std::span<const MeshInstance> unsorted);
+    Status prepare(Pass& pass, const char* macros);
     Status start(Batch& batch, const Kernel& kernel);
-    Status stream(const Kernel& kernel, const Source& fetch, const std::function<Status(Batch&)>& take);
-    void nameTriangles(std::span<RayHit> hits) const;
+    Expected<double> wait(Batch& batch);
+    Status stream(Pass& pass, const Source& fetch, const std::function<Status(Batch&)>& take);
 };
 
-Status RayCaster::State::build(const Mesh& mesh) {
+Status RayCaster::State::addModel(const Mesh& mesh) {
+    if (Status status = mesh.validate(); !status && status.error().id() != "mesh.not_finite") return status;
+    if (const uint64_t limit = device.getFeatures().maxTracingPrimitives; mesh.triangleCount() > limit)
+        return makeError(ErrorCode::OutOfRange, "tracing.too_large", "the mesh has {} triangles, the device takes {}",
+                         mesh.triangleCount(), limit);
     Triangles triangles = sortedTriangles(mesh);
     if (triangles.numbers.empty())
         return makeError(ErrorCode::InvalidArgument, "mesh.no_faces",
                          "none of the {} triangles has three finite corners", mesh.triangleCount());
-    numbers = std::move(triangles.numbers);
+    Model model;
+    model.center = mesh.bounds().center();
+    model.numbers = std::move(triangles.numbers);
     for (const MeshPart& part : mesh.parts) {
-        part_begins.push_back(part.first_index / 3);
-        part_ends.push_back((part.first_index + part.index_count) / 3);
+        model.part_begins.push_back(part.first_index / 3);
+        model.part_ends.push_back((part.first_index + part.index_count) / 3);
     }
-
     const Buffer vertices =
         device.createBuffer(Buffer::FlagTracing, std::span(triangles.mesh.positions), "ray caster: positions");
     const Buffer indices =
         device.createBuffer(Buffer::FlagTracing, std::span(triangles.mesh.indices), "ray caster: indices");
-    model = device.createTracing("ray caster: triangles");
-    model.addVertexBuffer(static_cast<uint32_t>(triangles.mesh.positions.size()), FormatRGBf32, sizeof(Vector3f),
-                          vertices);
-    model.addIndexBuffer(static_cast<uint32_t>(triangles.mesh.indices.size()), FormatRu32, indices);
-    if (Status status = model.create(Tracing::TypeTriangle); !status) return status;
-    scene = device.createTracing({Tracing::Instance{.tracing = &model}});
-    if (Status status = device.buildTracings({model, scene}); !status) return status;
+    model.tracing = device.createTracing("ray caster: triangles");
+    model.tracing.addVertexBuffer(static_cast<uint32_t>(triangles.mesh.positions.size()), FormatRGBf32,
+                                  sizeof(Vector3f), vertices);
+    model.tracing.addIndexBuffer(static_cast<uint32_t>(triangles.mesh.indices.size()), FormatRu32, indices);
+    if (Status status = model.tracing.create(Tracing::TypeTriangle); !status) return status;
+    models.push_back(std::move(model));
+    return {};
+}
+
+Status RayCaster::State::build(std::span<const MeshInstance> unsorted) {
+    std::vector<Tracing::Instance> records;
+    for (const uint32_t number : sortedInstances(models, unsorted)) {
+        MeshInstance& instance = instances.emplace_back(unsorted[number]);
+        if (instance.index == MeshInstance::by_place) instance.index = number;
+        Tracing::Instance& record = records.emplace_back();
+        std::copy(instance.transform.rows.begin(), instance.transform.rows.end(), record.transform);
+        record.tracing = &models[instance.mesh].tracing;
+        record.mask = instance.mask;
+    }
+    scene = device.createTracing(records, Tracing::FlagFastTrace, "ray caster: instances");
+    std::vector<Tracing> tracings;
+    for (const Model& model : models) tracings.push_back(model.tracing);
+    tracings.push_back(scene);
+    if (Status status = device.buildTracings(tracings, Buffer()); !status) return status;
 
     room = static_cast<uint32_t>(std::min<uint64_t>(chunk, device.getFeatures().maxStorageSize / sizeof(Ray)));
     for (Batch& batch : batches) {
@@ -163,32 +244,51 @@ Status RayCaster::State::build(const Mesh& mesh) {
         if (!batch.rays) return batch.rays.error();
         if (!batch.results) return batch.results.error();
         if (!batch.fence) return batch.fence.error();
+        if (!device.getFeatures().has(FeatureTimestamps)) continue;
+        batch.time = device.createQuery(Query::TypeTime, "ray caster");
+        if (!batch.time) return batch.time.error();
     }
     return device.finish();
 }
 
-Status RayCaster::State::prepare(Kernel& kernel, const char* macros) {
-    if (kernel) return {};
-    kernel = device.createKernel("ray caster");
-    kernel.createShaderGLSL(source, macros);
-    return kernel.create();
+Status RayCaster::State::prepare(Pass& pass, const char* macros) {
+    if (pass.kernel) return {};
+    pass.kernel = device.createKernel("ray caster");
+    pass.kernel.createShaderGLSL(source, macros);
+    return pass.kernel.create();
 }
 
 Status RayCaster::State::start(Batch& batch, const Kernel& kernel) {
     Compute compute = device.createCompute(Queue::Main, "ray caster");
+    if (batch.time) compute.beginQuery(batch.time);
     compute.setKernel(kernel);
     compute.setTracing(0, scene);
     compute.setStorageBuffers(0, {batch.rays, batch.results});
-    compute.setPushConstants(batch.count);
+    compute.setPushConstants(std::array{batch.count, mask});
     compute.dispatch(batch.count);
+    if (batch.time) compute.endQuery(batch.time);
+    batch.begin = std::chrono::steady_clock::now();
     return device.submit(compute, batch.fence);
 }
 
-Status RayCaster::State::stream(const Kernel& kernel, const Source& fetch, const std::function<Status(Batch&)>& take) {
+/// Waits for the batch: the seconds that it took.
+Expected<double> RayCaster::State::wait(Batch& batch) {
+    if (Status status = batch.fence.wait(); !status) return unexpected(status.error());
+    if (!batch.time) return std::chrono::duration<double>(std::chrono::steady_clock::now() - batch.begin).count();
+    const Expected<uint64_t> nanoseconds = device.getTime(batch.time);
+    if (!nanoseconds) return unexpected(nanoseconds.error());
+    return static_cast<double>(*nanoseconds) * 1e-9;
+}
+
+Status RayCaster::State::stream(Pass& pass, const Source& fetch, const std::function<Status(Batch&)>& take) {
     const auto finish = [&](Batch& batch) {
         if (batch.count == 0) return Status();
-        Status status = batch.fence.wait();
-        if (status) status = take(batch);
+        const Expected<double> seconds = wait(batch);
+        Status status = seconds ? Status() : Status(seconds.error());
+        if (status) {
+            pass.pieces.add(batch.count, *seconds);
+            status = take(batch);
+        }
         batch.count = 0;
         return status;
     };
@@ -196,18 +296,19 @@ Status RayCaster::State::stream(const Kernel& kernel, const Source& fetch, const
     Status status;
     for (size_t turn = 0; status; turn++) {
         Batch& batch = batches[turn % 2];
-        const Expected<uint64_t> count = fetch({static_cast<Ray*>(batch.rays.map()), room});
+        const uint32_t size = pass.pieces.next(room);
+        const Expected<uint64_t> count = fetch({static_cast<Ray*>(batch.rays.map()), size});
         if (!count) {
             status = count.error();
             break;
         }
-        batch.count = static_cast<uint32_t>(std::min<uint64_t>(*count, room));
+        batch.count = static_cast<uint32_t>(std::min<uint64_t>(*count, size));
         Batch& other = batches[(turn + 1) % 2];
         if (batch.count == 0) {
             status = finish(other);
             break;
         }
-        status = start(batch, kernel);
+        status = start(batch, pass.kernel);
         if (status) status = finish(other);
     }
     // After an error the other batch may still be under way.
@@ -218,45 +319,46 @@ Status RayCaster::State::stream(const Kernel& kernel, const Source& fetch, const
     return status;
 }
 
-void RayCaster::State::nameTriangles(std::span<RayHit> hits) const {
-    for (RayHit& hit : hits) {
-        if (!hit.isHit()) continue;
-        hit.primitive = numbers[hit.primitive];
-        hit.geometry = 0;
-        if (part_ends.empty()) continue;
-        const auto part = std::upper_bound(part_ends.begin(), part_ends.end(), hit.primitive);
-        const auto place = static_cast<size_t>(part - part_ends.begin());
-        const bool inside = part != part_ends.end() && part_begins[place] <= hit.primitive;
-        hit.geometry = static_cast<uint32_t>(inside ? place : part_ends.size());
-    }
-}
-
 RayCaster::RayCaster(std::unique_ptr<State> state) : state_(std::move(state)) {}
 RayCaster::RayCaster(RayCaster&&) noexcept = default;
 RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
 RayCaster::~RayCaster() = default;
 
 Expected<RayCaster> RayCaster::create(const Device& device, const Mesh& mesh) {
+    return create(device, {&mesh, 1}, std::array{MeshInstance()});
+}
+
+Expected<RayCaster> RayCaster::create(const Device& device, std::span<const Mesh> meshes,
+                                      std::span<const MeshInstance> instances) {
     if (!device) return unexpected(device.error());
     if (!device.getFeatures().computeTracing)
         return unexpected(makeError(ErrorCode::Unsupported, "device.unsupported", "{} lacks {}", device.getInfo().name,
                                     featureNames(FeatureComputeTracing)));
-    if (Status status = mesh.validate(); !status && status.error().id() != "mesh.not_finite")
-        return unexpected(status.error());
-    if (const uint64_t limit = device.getFeatures().maxTracingPrimitives; mesh.triangleCount() > limit)
-        return unexpected(makeError(ErrorCode::OutOfRange, "tracing.too_large",
-                                    "the mesh has {} triangles, the device takes {}", mesh.triangleCount(), limit));
+    if (Status status = checkInstances(meshes.size(), instances); !status) return unexpected(status.error());
     auto state = std::make_unique<State>();
     state->device = device;
-    if (Status status = state->build(mesh); !status) return unexpected(status.error());
+    state->models.reserve(meshes.size());  // instances point at them
+    for (size_t i = 0; i < meshes.size(); i++) {
+        const Status status = state->addModel(meshes[i]);
+        if (status) continue;
+        return unexpected(meshes.size() == 1 ? status.error() : status.error().named(fmt::format("mesh {}", i)));
+    }
+    if (Status status = state->build(instances); !status) return unexpected(status.error());
     return RayCaster(std::move(state));
 }
+
+void RayCaster::setMask(uint8_t mask) { state_->mask = mask; }
 
 Status RayCaster::cast(const Source& fetch, const HitSink& sink) {
     if (Status status = state_->prepare(state_->closest, "ANY=0"); !status) return status;
     return state_->stream(state_->closest, fetch, [&](Batch& batch) {
         const std::span hits(static_cast<RayHit*>(batch.results.map()), batch.count);
-        state_->nameTriangles(hits);
+        for (RayHit& hit : hits) {
+            if (!hit.isHit()) continue;
+            const MeshInstance& instance = state_->instances[hit.instance];
+            state_->models[instance.mesh].name(hit);
+            hit.instance = instance.index;
+        }
         return sink(hits);
     });
 }
@@ -273,39 +375,39 @@ Status RayCaster::castAny(const Source& fetch, const AnySink& sink) {
 
 namespace {
 
-RayCaster::Source sourceOf(std::span<const Ray>& left) {
-    return [&left](std::span<Ray> rays) -> Expected<uint64_t> {
+/// What `cast(source, sink)` gives for rays in memory.
+template <class Hit, class Cast>
+Expected<std::vector<Hit>> collect(std::span<const Ray> left, Cast&& cast) {
+    std::vector<Hit> all;
+    all.reserve(left.size());
+    const RayCaster::Source fetch = [&](std::span<Ray> rays) -> Expected<uint64_t> {
         const size_t count = std::min(rays.size(), left.size());
-        std::copy(left.begin(), left.begin() + static_cast<std::ptrdiff_t>(count), rays.begin());
+        std::copy_n(left.begin(), count, rays.begin());
         left = left.subspan(count);
         return count;
     };
+    const Status status = cast(fetch, [&](std::span<const Hit> hits) {
+        all.insert(all.end(), hits.begin(), hits.end());
+        return Status();
+    });
+    if (!status) return unexpected(status.error());
+    return all;
 }
 
 }  // namespace
 
 Expected<std::vector<RayHit>> RayCaster::cast(std::span<const Ray> rays) {
-    std::vector<RayHit> all;
-    all.reserve(rays.size());
-    const Status status = cast(sourceOf(rays), [&](std::span<const RayHit> hits) {
-        all.insert(all.end(), hits.begin(), hits.end());
-        return Status();
-    });
-    if (!status) return unexpected(status.error());
-    return all;
+    return collect<RayHit>(rays, [&](const Source& fetch, const HitSink& sink) { return cast(fetch, sink); });
 }
 
 Expected<std::vector<uint8_t>> RayCaster::castAny(std::span<const Ray> rays) {
-    std::vector<uint8_t> all;
-    all.reserve(rays.size());
-    const Status status = castAny(sourceOf(rays), [&](std::span<const uint8_t> hits) {
-        all.insert(all.end(), hits.begin(), hits.end());
-        return Status();
-    });
-    if (!status) return unexpected(status.error());
-    return all;
+    return collect<uint8_t>(rays, [&](const Source& fetch, const AnySink& sink) { return castAny(fetch, sink); });
 }
 
-uint64_t RayCaster::getMemory() const { return state_->model.getMemory() + state_->scene.getMemory(); }
+uint64_t RayCaster::getMemory() const {
+    uint64_t bytes = state_->scene.getMemory();
+    for (const Model& model : state_->models) bytes += model.tracing.getMemory();
+    return bytes;
+}
 
 }  // namespace glint

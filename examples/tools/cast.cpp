@@ -3,6 +3,7 @@
 #include "tool.h"
 
 #include <glint/base/file.h>
+#include <glint/format/mesh_scene.h>
 #include <glint/format/npy.h>
 #include <glint/graphics/ray_caster.h>
 
@@ -16,6 +17,7 @@
 #include <cstdio>
 #include <memory>
 #include <optional>
+#include <vector>
 
 using namespace glint;
 
@@ -24,12 +26,14 @@ namespace tool {
 namespace {
 
 struct Options {
-    std::filesystem::path mesh;
+    std::filesystem::path scene;
     std::filesystem::path rays;
     std::filesystem::path hits;
     std::filesystem::path stats;
     std::string adapter;
     std::string api;
+    std::string tracing = "auto";
+    uint32_t mask = 0xff;
     bool any = false;
 };
 
@@ -102,11 +106,12 @@ private:
 NpyHeader hitHeader(bool any, uint64_t count) {
     if (any) return {{NpyField::of<bool>()}, {count}};
     return {{NpyField::of<float>("t"), NpyField::of<uint32_t>("primitive"), NpyField::of<uint32_t>("geometry"),
-             NpyField::of<float>("u"), NpyField::of<float>("v"), NpyField::of<bool>("front"), NpyField::padding(3)},
+             NpyField::of<float>("u"), NpyField::of<float>("v"), NpyField::of<bool>("front"), NpyField::padding(3),
+             NpyField::of<uint32_t>("instance")},
             {count}};
 }
-// A hit's `front` is 0 or 1: its first byte is the bool and the others are the padding.
-static_assert(sizeof(RayHit) == 24 && offsetof(RayHit, front) == 20 && std::endian::native == std::endian::little);
+// A hit's `front` is 0 or 1: its first byte is the bool and its others are the padding.
+static_assert(sizeof(RayHit) == 28 && offsetof(RayHit, front) == 20 && std::endian::native == std::endian::little);
 
 Expected<NpyReader> openRays(const std::filesystem::path& path) {
     Expected<NpyReader> reader = NpyReader::open(path);
@@ -124,7 +129,8 @@ Expected<NpyReader> openRays(const std::filesystem::path& path) {
 struct Outcome {
     uint64_t rays = 0;
     uint64_t hits = 0;
-    uint64_t triangles = 0;
+    uint64_t triangles = 0;  ///< of all meshes
+    uint64_t instances = 0;
     uint64_t tracing_bytes = 0;
     DeviceInfo info;
     Seconds seconds;
@@ -134,8 +140,9 @@ Status writeStatistics(const Options& options, const Outcome& outcome) {
     const Seconds& seconds = outcome.seconds;
     const auto rays = static_cast<double>(outcome.rays);
     const nlohmann::ordered_json json = {
-        {"mesh", options.mesh.string()},
+        {"scene", options.scene.string()},
         {"triangles", outcome.triangles},
+        {"instances", outcome.instances},
         {"any", options.any},
         {"rays", outcome.rays},
         {"hits", outcome.hits},
@@ -190,41 +197,69 @@ Status castAll(const Options& options, RayCaster& caster, NpyReader& reader, Out
     return writer->close();
 }
 
+/// What rays are cast at: a scene of meshes, or one mesh that stands where it is.
+struct Target {
+    std::vector<Mesh> meshes;
+    std::vector<MeshInstance> instances;
+};
+
+Expected<Target> loadTarget(const std::filesystem::path& path) {
+    Target target;
+    if (path.extension() == ".json") {
+        Expected<MeshScene> scene = MeshScene::load(path);
+        if (!scene) return unexpected(scene.error());
+        Expected<std::vector<Mesh>> meshes = scene->loadMeshes();
+        if (!meshes) return unexpected(meshes.error());
+        target.meshes = std::move(*meshes);
+        target.instances = std::move(scene->instances);
+        return target;
+    }
+    Expected<Mesh> mesh = Mesh::load(path);
+    if (!mesh) return unexpected(mesh.error());
+    target.meshes.push_back(std::move(*mesh));
+    target.instances.emplace_back();
+    return target;
+}
+
+Expected<RayCaster> createCaster(const Options& options, Outcome& outcome) {
+    std::optional<Expected<Target>> target;
+    {
+        const Stopwatch watch(outcome.seconds.load);
+        target = loadTarget(options.scene);
+    }
+    if (!*target) return unexpected(target->error());
+    for (const Mesh& mesh : (*target)->meshes) outcome.triangles += mesh.triangleCount();
+    outcome.instances = (*target)->instances.size();
+
+    const Stopwatch watch(outcome.seconds.build);
+    // Errors are returned, too: one line is enough. What the validation layer says is not.
+    const auto tell = [](const Message& message) {
+        if (message.error.id() == "vulkan.validation") fmt::print(stderr, "{}\n", message.error.text());
+    };
+    const Device device = Device::create({.api = options.api,
+                                          .adapter = options.adapter,
+                                          .required = FeatureComputeTracing,
+                                          .optional = FeatureTimestamps,
+                                          .message = tell});
+    if (!device) return unexpected(device.error());
+    outcome.info = device.getInfo();
+    Expected<RayCaster> caster = RayCaster::create(device, (*target)->meshes, (*target)->instances);
+    if (!caster) return caster;
+    caster->setMask(static_cast<uint8_t>(options.mask));
+    outcome.tracing_bytes = caster->getMemory();
+    return caster;
+}
+
 Expected<Outcome> cast(const Options& options) {
     Outcome outcome;
     Expected<NpyReader> reader = openRays(options.rays);
     if (!reader) return unexpected(reader.error());
-    std::optional<Expected<Mesh>> mesh;
-    {
-        const Stopwatch watch(outcome.seconds.load);
-        mesh = Mesh::load(options.mesh);
-    }
-    if (!*mesh) return unexpected(mesh->error());
-    outcome.triangles = (*mesh)->triangleCount();
-
-    std::optional<Expected<RayCaster>> caster;
-    {
-        const Stopwatch watch(outcome.seconds.build);
-        // Errors are returned, too: one line is enough. What the validation layer says is not.
-        const auto tell = [](const Message& message) {
-            if (message.error.id() == "vulkan.validation") fmt::print(stderr, "{}\n", message.error.text());
-        };
-        const Device device = Device::create({.api = options.api,
-                                              .adapter = options.adapter,
-                                              .required = FeatureComputeTracing,
-                                              .optional = FeatureNone,
-                                              .message = tell});
-        if (!device) return unexpected(device.error());
-        outcome.info = device.getInfo();
-        caster = RayCaster::create(device, **mesh);
-    }
-    if (!*caster) return unexpected(caster->error());
-    outcome.tracing_bytes = (*caster)->getMemory();
-    mesh.reset();
+    Expected<RayCaster> caster = createCaster(options, outcome);
+    if (!caster) return unexpected(caster.error());
     if (Status status = checkInterrupt(); !status) return unexpected(status.error());
     {
         const Stopwatch watch(outcome.seconds.cast);
-        if (Status status = castAll(options, **caster, *reader, outcome); !status) return unexpected(status.error());
+        if (Status status = castAll(options, *caster, *reader, outcome); !status) return unexpected(status.error());
     }
     if (!options.stats.empty())
         if (Status status = writeStatistics(options, outcome); !status) return unexpected(status.error());
@@ -232,6 +267,8 @@ Expected<Outcome> cast(const Options& options) {
 }
 
 int run(const Options& options) {
+    if (options.tracing == "software")
+        return failUsage("cast", "--tracing software: this version traces with the driver only");
     catchSignals();
     const Expected<Outcome> outcome = cast(options);
     if (!outcome) {
@@ -254,16 +291,22 @@ int run(const Options& options) {
 
 Command castCommand(CLI::App& app) {
     auto options = std::make_shared<Options>();
-    CLI::App* sub = app.add_subcommand("cast", "Casts rays at a mesh: closest hits, or occlusion");
-    sub->add_option("MESH", options->mesh, "Mesh of triangles")->required();
+    CLI::App* sub = app.add_subcommand("cast", "Casts rays at a mesh or a scene of meshes: closest hits, or occlusion");
+    sub->add_option("SCENE", options->scene,
+                    "Mesh of triangles (.obj, .ply, .gltf, .glb), or instances of such (.json)")
+        ->required();
     sub->add_option("RAYS", options->rays, "Rays: float32 [N, 8] as .npy: origin, tmin, direction, tmax")->required();
     sub->add_option("HITS", options->hits,
-                    "Where to write the hits: [N] as .npy, of t, primitive, geometry, u, v, front")
+                    "Where to write the hits: [N] as .npy, of t, primitive, geometry, u, v, front, instance")
         ->required();
     sub->add_flag("--any", options->any, "Write whether each ray hits anything: bool [N]");
+    sub->add_option("--mask", options->mask, "See instances whose mask shares a bit with this one: 0 to 255")
+        ->type_name("N")
+        ->check(CLI::Range(0u, 255u));
     sub->add_option("--stats", options->stats, "Write times and counts to this file")->type_name("FILE.json");
     sub->add_option("--adapter", options->adapter, "Adapter: its index or a part of its name")->type_name("N|NAME");
     sub->add_option("--api", options->api, "Graphics API")->type_name("NAME");
+    addTracing(*sub, options->tracing);
     return {sub, [options] { return run(*options); }};
 }
 

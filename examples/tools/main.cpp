@@ -27,6 +27,16 @@ bool isFailure(const glint::Error& error) {
 
 }  // namespace
 
+void addTracing(CLI::App& app, std::string& value) {
+    app.add_option("--tracing", value, "Engine for ray tracing")
+        ->type_name("auto|driver|software")
+        ->capture_default_str()
+        ->check([](const std::string& text) {
+            const bool is_known = text == "auto" || text == "driver" || text == "software";
+            return is_known ? std::string() : "'" + text + "' is none of auto, driver, software";
+        });
+}
+
 int fail(const char* command, const glint::Error& error) {
     // Whoever calls the program has no use for a line of its sources; of a shader or a mesh, yes.
     const bool in_sources = error.file().ends_with(".cpp");

@@ -29,6 +29,9 @@ Command infoCommand(CLI::App& app);
 Command shaderCommand(CLI::App& app);
 Command castCommand(CLI::App& app);
 
+/// Adds --tracing auto|driver|software: the engine for ray tracing.
+void addTracing(CLI::App& app, std::string& value);
+
 /// Prints "glint cast: what went wrong [id]" on stderr and returns the status that fits.
 int fail(const char* command, const glint::Error& error);
 /// The same for arguments that are wrong, with the id "tool.arguments".

@@ -31,6 +31,7 @@ struct NullSettings {
     uint64_t fail_submit = 0;    ///< the n-th submission fails with this code; 0: none
     ErrorCode fail_code = ErrorCode::OutOfMemory;  ///< or DeviceLost
     bool judge = true;                             ///< by the hazard checker
+    uint64_t group_time = 0;                       ///< nanoseconds of a group of a dispatch, as time queries see it
 };
 
 /// Replaces the settings of devices created from now on, until the end of the scope.

@@ -82,7 +82,9 @@ void NullPlayer::play(const CommandHeader& header) {
         case CommandType::Dispatch: {
             const auto& command = as<DispatchCommand>(header);
             counters_.dispatches++;
-            statistics_[6] += uint64_t(command.groups[0]) * command.groups[1] * command.groups[2];
+            const uint64_t groups = uint64_t(command.groups[0]) * command.groups[1] * command.groups[2];
+            statistics_[6] += groups;
+            nanoseconds_ += groups * control_.settings().group_time;
             break;
         }
         case CommandType::DispatchIndirect: {

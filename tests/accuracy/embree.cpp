@@ -62,7 +62,7 @@ RayHit closestHit(RTCScene scene, const Ray& ray, uint32_t* instance) {
         const RTCHit& found = query.hit;
         // Its normal follows from the corners as ours does, so it looks towards the origin of a ray from in front.
         const float facing = found.Ng_x * ray.direction.x + found.Ng_y * ray.direction.y + found.Ng_z * ray.direction.z;
-        hit = {query.ray.tfar, found.primID, 0, found.u, found.v, facing < 0.0f ? 1u : 0u};
+        hit = {query.ray.tfar, found.primID, 0, found.u, found.v, facing < 0.0f ? 1u : 0u, 0};
     }
     if (instance != nullptr) *instance = query.hit.instID[0];
     return hit;

@@ -33,6 +33,7 @@ TEST_F(RayCasterTest, GivesWhatItSays) {
     EXPECT_EQ(hits[0].t, 2.0f);
     EXPECT_EQ(hits[0].geometry, 0u);
     EXPECT_EQ(hits[0].front, 1u);
+    EXPECT_EQ(hits[0].instance, 0u);
     EXPECT_EQ(hits[1].t, 2.0f);
     EXPECT_EQ(hits[1].front, 0u);
     EXPECT_EQ(hits[1].primitive, hits[0].primitive);
@@ -141,8 +142,10 @@ TEST_F(RayCasterTest, ErrorsEndTheCast) {
     ASSERT_THAT(caster, IsOk());
     const Error stop = Error::inFile(ErrorCode::Io, "test.stop", "enough", {}, 0);
     int calls = 0;
+    uint64_t first = 0;
     const RayCaster::Source endless = [&](std::span<Ray> rays) -> Expected<uint64_t> {
         std::fill(rays.begin(), rays.end(), Ray());
+        if (calls == 0) first = rays.size();
         if (calls++ == 2) return unexpected(stop);
         return rays.size();
     };
@@ -152,7 +155,7 @@ TEST_F(RayCasterTest, ErrorsEndTheCast) {
         return Status();
     };
     EXPECT_THAT(caster->cast(endless, count), HasErrorId("test.stop"));
-    EXPECT_EQ(taken, RayCaster::chunk);
+    EXPECT_EQ(taken, first);
     calls = 10;
     EXPECT_THAT(caster->cast(endless, [&](std::span<const RayHit>) { return Status(stop); }), HasErrorId("test.stop"));
     // The caster is as good as new.

@@ -28,7 +28,6 @@ constexpr uint32_t rounds = 9;
 /// As the kernel writes it.
 struct BatchHit {
     RayHit hit;
-    uint32_t instance;
     uint32_t unused;
 };
 

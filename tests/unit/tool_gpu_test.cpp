@@ -281,7 +281,8 @@ TEST_F(Tool, Casts) {
     ASSERT_THAT(hits, IsOk());
     ASSERT_THAT(any, IsOk());
     EXPECT_EQ(describe(hits->header),
-              "{t: float32, primitive: uint32, geometry: uint32, u: float32, v: float32, front: bool, 3 bytes} [3000]");
+              "{t: float32, primitive: uint32, geometry: uint32, u: float32, v: float32, front: bool, 3 bytes, "
+              "instance: uint32} [3000]");
     std::vector<RayHit> records(3000);
     std::memcpy(records.data(), hits->data.data(), hits->data.size());
     EXPECT_FALSE(records[10].isHit());
@@ -304,6 +305,67 @@ TEST_F(Tool, Casts) {
     writeRays(dir / "none.npy", {});
     expectSuccess("cast torus.obj none.npy none_hits.npy");
     EXPECT_EQ(decodeNpy(*readFile(dir / "none_hits.npy"))->header.elements(), 0u);
+}
+
+// Two tori, one of them turned about X, moved and called 9; each is hit where the float64 reference hits it alone.
+TEST_F(Tool, CastsAtScenes) {
+    const Mesh mesh = createTorus(1.0f, 0.4f, 40, 20);
+    std::filesystem::create_directory(dir / "sub");
+    write("sub/torus.obj", objText(mesh));
+    write("scene.json", R"({"meshes": {"torus": "sub/torus.obj"}, "instances": [{"mesh": "torus", "mask": 1},
+        {"mesh": "torus", "translate": [20, 0, 0], "rotate": [1, 0, 0, 180], "index": 9, "mask": 2}]})");
+    std::vector<Ray> rays = raysAround(mesh, 1000);
+    for (size_t i = 0; i < rays.size(); i++)
+        rays[i].t_max = std::min(rays[i].t_max, 5.0f / glm::length(rays[i].direction));
+    const std::vector<Ray> plain = rays;
+    // The same rays turned and moved with the second: signs change, and 20 has few digits to take away.
+    for (const Ray& ray : plain)
+        rays.push_back({{ray.origin.x + 20.0f, -ray.origin.y, -ray.origin.z},
+                        ray.t_min,
+                        {ray.direction.x, -ray.direction.y, -ray.direction.z},
+                        ray.t_max});
+    writeRays(dir / "rays.npy", rays);
+    const auto cast = [&](const std::string& options) {
+        expectSuccess("cast scene.json rays.npy hits.npy " + options);
+        std::vector<RayHit> hits(2000);
+        const Expected<NpyArray> array = decodeNpy(*readFile(dir / "hits.npy"));
+        EXPECT_EQ(array->data.size(), hits.size() * sizeof(RayHit));
+        if (array->data.size() == hits.size() * sizeof(RayHit))
+            std::memcpy(hits.data(), array->data.data(), array->data.size());
+        return hits;
+    };
+    const std::vector<RayHit> hits = cast("--stats stats.json");
+    const auto stats = nlohmann::json::parse(*readTextFile(dir / "stats.json"));
+    EXPECT_EQ(stats["instances"], 2);
+    EXPECT_EQ(stats["triangles"], 1600);
+    uint64_t counts[2] = {};
+    for (size_t i = 0; i < hits.size(); i++) {
+        if (!hits[i].isHit()) continue;
+        EXPECT_EQ(hits[i].instance, i < 1000 ? 0u : 9u) << i;
+        counts[i / 1000]++;
+    }
+    EXPECT_GT(counts[0], 300u);
+    EXPECT_GT(counts[1], 300u);
+    const HitComparison result =
+        compareHits(ReferenceHierarchy(mesh), plain, std::vector(hits.begin(), hits.begin() + 1000));
+    EXPECT_EQ(result.wrong, 0u) << result.first;
+    // Those that see the first, with the first alone.
+    const std::vector<RayHit> masked = cast("--mask 1");
+    EXPECT_TRUE(std::equal(hits.begin(), hits.begin() + 1000, masked.begin()));
+    EXPECT_TRUE(std::none_of(masked.begin() + 1000, masked.end(), [](const RayHit& hit) { return hit.isHit(); }));
+
+    const std::vector<std::string> before = files();
+    write("bad.json", R"({"meshes": {"a": "sub/torus.obj"}, "instances": [{"mesh": "a", "scale": 0}]})");
+    expectFailure("cast bad.json rays.npy x.npy", 2, "scene.value");
+    write("bad.json", R"({"meshes": {"a": "sub/absent.obj"}, "instances": [{"mesh": "a"}]})");
+    expectFailure("cast bad.json rays.npy x.npy", 1, "file.open");
+    write("sub/bad.obj", "v 0 0 x\n");
+    write("bad.json", R"({"meshes": {"a": "sub/bad.obj"}, "instances": [{"mesh": "a"}]})");
+    expectFailure("cast bad.json rays.npy x.npy", 2, "mesh.syntax");
+    expectFailure("cast absent.json rays.npy x.npy", 1, "file.open");
+    expectFailure("cast scene.json rays.npy x.npy --mask 256", 2, "tool.arguments");
+    std::filesystem::remove(dir / "bad.json");
+    EXPECT_EQ(files(), before);
 }
 
 TEST_F(Tool, CastLeavesNothingHalfDone) {

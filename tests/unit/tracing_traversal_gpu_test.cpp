@@ -29,7 +29,6 @@ Hierarchy buildMesh(const Mesh& mesh, BuildMode mode = BuildMode::Quality, bool 
 /// As the kernel of batch.h writes it.
 struct BatchHit {
     RayHit hit;
-    uint32_t instance;
     uint32_t unused;
 };
 

@@ -291,8 +291,15 @@ bool isInvertible(const Transform3x4& transform) {
         rows[i] = Vector3d(row[0], row[1], row[2]);
     }
     // Products of three float32 numbers round in float64, by 2^-53 each: a volume below that is none.
-    const double lengths = glm::length(rows[0]) * glm::length(rows[1]) * glm::length(rows[2]);
-    return std::abs(glm::dot(rows[0], glm::cross(rows[1], rows[2]))) > 0x1p-48 * lengths;
+    const double volume = std::abs(glm::dot(rows[0], glm::cross(rows[1], rows[2])));
+    if (!(volume > 0x1p-48 * glm::length(rows[0]) * glm::length(rows[1]) * glm::length(rows[2]))) return false;
+    // The inverse has to be of float32 numbers, too.
+    for (size_t i = 0; i < 3; i++) {
+        const Vector3d column = glm::abs(glm::cross(rows[i], rows[(i + 1) % 3])) / volume;
+        const double largest = std::max({column.x, column.y, column.z});
+        if (!(largest <= double{std::numeric_limits<float>::max()})) return false;
+    }
+    return true;
 }
 
 Expected<MeshScene> parseMeshScene(std::string_view text, const std::filesystem::path& path) {

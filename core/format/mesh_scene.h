@@ -24,7 +24,7 @@ struct MeshInstance {
 };
 
 /// True if the transform is finite and can be inverted: if its three axes span a volume that float32 entries can tell
-/// from none.
+/// from none, and float32 can hold the inverse.
 bool isInvertible(const Transform3x4& transform);
 
 /// Meshes of files and where their instances stand, as `glint cast` reads them from a JSON text.

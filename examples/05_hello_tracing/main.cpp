@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
     Example example(EXAMPLE_NAME, "Traces 4,608 instances of a mesh with ray queries.");
     std::filesystem::path mesh_path;
     bool use_fragment = false, is_single = false;
-    example.add("--mesh", mesh_path, "Mesh to show (.obj, .ply); a torus without it");
+    example.add("--mesh", mesh_path, "Mesh to show (.obj, .ply, .gltf, .glb); a torus without it");
     example.add("--single", is_single, "Show one instance, from near");
     example.addKnob("--fragment", use_fragment, "Trace in a fragment shader instead of a compute shader");
     if (!example.parse(argc, argv)) return example.exitCode();

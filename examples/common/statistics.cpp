@@ -29,11 +29,14 @@ void Statistics::setRays(const std::string& pass, uint64_t rays) {
     rays_ = rays;
 }
 
-double Statistics::median(const std::string& pass) const {
+const std::vector<uint64_t>& Statistics::times(const std::string& pass) const {
+    static const std::vector<uint64_t> none;
     for (const Pass& each : passes_)
-        if (each.name == pass) return medianOf(each.times);
-    return 0.0;
+        if (each.name == pass) return each.times;
+    return none;
 }
+
+double Statistics::median(const std::string& pass) const { return medianOf(times(pass)); }
 
 std::vector<std::string> Statistics::passNames() const {
     std::vector<std::string> names;
@@ -42,9 +45,7 @@ std::vector<std::string> Statistics::passNames() const {
 }
 
 double Statistics::last(const std::string& pass) const {
-    for (const Pass& each : passes_)
-        if (each.name == pass && !each.times.empty()) return static_cast<double>(each.times.back());
-    return 0.0;
+    return times(pass).empty() ? 0.0 : static_cast<double>(times(pass).back());
 }
 
 std::string Statistics::text() const {
@@ -58,6 +59,7 @@ std::string Statistics::text() const {
     addText("tracing", tracing);
     if (!features.empty()) json["features"] = features;
     if (!counts.empty()) json["counts"] = counts;
+    if (!series.empty()) json["series"] = series;
     if (rays_ && median(ray_pass_) > 0.0)
         json["rays_per_second"] = static_cast<double>(rays_) * 1e9 / median(ray_pass_);
     if (!passes_.empty()) {

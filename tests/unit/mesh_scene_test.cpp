@@ -198,6 +198,8 @@ TEST(MeshScene, TransformsThatCanBeInverted) {
     EXPECT_TRUE(check({1e-4f, 0, 0, 0, 1e4f, 0, 0, 0, -1}));
     EXPECT_TRUE(check({1e-12f, 0, 0, 0, 1e-12f, 0, 0, 0, 1e-12f}));
     EXPECT_TRUE(check({1, 1, 0, 1, 1.000001f, 0, 0, 0, 1}));
+    EXPECT_TRUE(check({1e-30f, 0, 0, 0, 1e-30f, 0, 0, 0, 1e-30f}));
+    EXPECT_FALSE(check({1e-39f, 0, 0, 0, 1, 0, 0, 0, 1}));
     EXPECT_FALSE(check({1, 2, 3, 2, 4, 6, 0, 0, 1}));
     EXPECT_FALSE(check({0.1f, 0.7f, 0.3f, 0.2f, 1.4f, 0.6f, 0, 0, 1}));
     EXPECT_FALSE(check({1, 0, 0, 0, 0, 0, 0, 0, 1}));

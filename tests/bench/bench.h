@@ -65,6 +65,7 @@ Benchmark tracingSoftwareBenchmark();
 Benchmark tracingBuildBenchmark();
 Benchmark tracingDeviceBenchmark();
 Benchmark castBenchmark();
+Benchmark castMemoryBenchmark();
 Benchmark tracingLeaksBenchmark();
 
 /// A failure that ends one benchmark and not the others.

@@ -53,7 +53,8 @@ int main(int argc, char** argv) {
     const Benchmark benchmarks[] = {shaderCompileBenchmark(), dispatchBenchmark(),        drawBenchmark(),
                                     warmFrameBenchmark(),     tracingFrameBenchmark(),    startupBenchmark(),
                                     memoryBenchmark(),        tracingSoftwareBenchmark(), tracingBuildBenchmark(),
-                                    tracingDeviceBenchmark(), tracingLeaksBenchmark(),    castBenchmark()};
+                                    tracingDeviceBenchmark(), tracingLeaksBenchmark(),    castBenchmark(),
+                                    castMemoryBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

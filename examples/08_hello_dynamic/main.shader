@@ -120,7 +120,6 @@ vec3 trace(vec3 origin, vec3 direction) {
                              vertexNormal(model * vertices + indices[corner + 2u]) * uv.y;
         // Row vector times the inverse of object-to-world: right for any affine transform.
         vec3 normal = normalize(object_normal * mat3(rayQueryGetIntersectionWorldToObjectEXT(query, true)));
-        normal = faceforward(normal, direction, normal);
         vec3 position = origin + direction * rayQueryGetIntersectionTEXT(query, true);
         return lit(position, normal, direction, modelColor(model), 0.35);
     }

@@ -24,7 +24,6 @@ using namespace glint::detail;
 /// As the kernel of batch.h writes it.
 struct BatchHit {
     RayHit hit;
-    uint32_t instance;
     uint32_t unused;
 
     bool operator==(const BatchHit&) const = default;

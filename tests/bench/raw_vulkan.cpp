@@ -74,22 +74,28 @@ RawDevice::RawDevice(std::string_view adapter, Tracing tracing) {
     VkPhysicalDeviceRayQueryFeaturesKHR ray_query = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_QUERY_FEATURES_KHR};
     ray_query.pNext = &acceleration;
     ray_query.rayQuery = VK_TRUE;
-    constexpr std::array extensions = {VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME, VK_KHR_RAY_QUERY_EXTENSION_NAME,
-                                       VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME};
+    VkPhysicalDeviceRayTracingPipelineFeaturesKHR pipelines = {
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR};
+    pipelines.pNext = &acceleration;
+    pipelines.rayTracingPipeline = VK_TRUE;
+    const std::array extensions = {
+        VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME, VK_KHR_DEFERRED_HOST_OPERATIONS_EXTENSION_NAME,
+        tracing == Tracing::On ? VK_KHR_RAY_QUERY_EXTENSION_NAME : VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME};
 
     VkDeviceCreateInfo device_info = {VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO};
     device_info.pNext = &features12;
     device_info.queueCreateInfoCount = 1;
     device_info.pQueueCreateInfos = &queue_info;
-    if (tracing == Tracing::On) {
-        features13.pNext = &ray_query;
+    if (tracing != Tracing::Off) {
+        features13.pNext = tracing == Tracing::On ? static_cast<void*>(&ray_query) : &pipelines;
         device_info.enabledExtensionCount = static_cast<uint32_t>(extensions.size());
         device_info.ppEnabledExtensionNames = extensions.data();
     }
     require(vk.CreateDevice(adapter_, &device_info, nullptr, &device_), "vkCreateDevice");
 #define GLINT_RAW_LOAD(name) vk.name = reinterpret_cast<PFN_vk##name>(vk.GetDeviceProcAddr(device_, "vk" #name));
     GLINT_RAW_DEVICE_FUNCTIONS(GLINT_RAW_LOAD)
-    if (tracing == Tracing::On) { GLINT_RAW_TRACING_FUNCTIONS(GLINT_RAW_LOAD) }
+    if (tracing != Tracing::Off) { GLINT_RAW_TRACING_FUNCTIONS(GLINT_RAW_LOAD) }
+    if (tracing == Tracing::Pipelines) { GLINT_RAW_PIPELINE_FUNCTIONS(GLINT_RAW_LOAD) }
 #undef GLINT_RAW_LOAD
     vk.GetDeviceQueue(device_, family_, 0, &queue_);
 
@@ -151,7 +157,17 @@ RawBuffer RawDevice::createBuffer(VkDeviceSize size, VkBufferUsageFlags usage, b
     VkMemoryRequirements requirements = {};
     vk.GetBufferMemoryRequirements(device_, result.buffer, &requirements);
     VkMemoryPropertyFlags wanted = VK_MEMORY_PROPERTY_DEVICE_LOCAL_BIT;
-    if (host) wanted = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+    if (host) {
+        // Cached where there is such memory: the processor reads other kinds a hundred times slower.
+        wanted = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT | VK_MEMORY_PROPERTY_HOST_COHERENT_BIT;
+        for (uint32_t type = 0; type < memory_.memoryTypeCount; type++) {
+            constexpr VkMemoryPropertyFlags cached = VK_MEMORY_PROPERTY_HOST_VISIBLE_BIT |
+                                                     VK_MEMORY_PROPERTY_HOST_COHERENT_BIT |
+                                                     VK_MEMORY_PROPERTY_HOST_CACHED_BIT;
+            const bool usable = (requirements.memoryTypeBits & (1u << type)) != 0;
+            if (usable && (memory_.memoryTypes[type].propertyFlags & cached) == cached) wanted = cached;
+        }
+    }
     const bool address = (usage & VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT) != 0;
     const VkDeviceMemory memory = allocate(requirements, wanted, address);
     require(vk.BindBufferMemory(device_, result.buffer, memory, 0), "vkBindBufferMemory");
@@ -315,6 +331,61 @@ RawProgram RawDevice::createPipeline(const RawGraphics& desc) {
     return program;
 }
 
+RawRays RawDevice::createRays(std::span<const uint32_t> generation, std::span<const uint32_t> miss,
+                              std::span<const uint32_t> hit, std::span<const VkDescriptorSetLayoutBinding> bindings) {
+    RawRays rays = {.program = createLayout(bindings)};
+    std::array<VkPipelineShaderStageCreateInfo, 3> stages = {};
+    std::array<VkRayTracingShaderGroupCreateInfoKHR, 3> groups = {};
+    const std::array modules = {generation, miss, hit};
+    constexpr std::array kinds = {VK_SHADER_STAGE_RAYGEN_BIT_KHR, VK_SHADER_STAGE_MISS_BIT_KHR,
+                                  VK_SHADER_STAGE_CLOSEST_HIT_BIT_KHR};
+    for (uint32_t i = 0; i < 3; i++) {
+        stages[i].sType = VK_STRUCTURE_TYPE_PIPELINE_SHADER_STAGE_CREATE_INFO;
+        stages[i].stage = kinds[i];
+        stages[i].module = createModule(modules[i]);
+        stages[i].pName = "main";
+        groups[i] = {VK_STRUCTURE_TYPE_RAY_TRACING_SHADER_GROUP_CREATE_INFO_KHR};
+        groups[i].type = i < 2 ? VK_RAY_TRACING_SHADER_GROUP_TYPE_GENERAL_KHR
+                               : VK_RAY_TRACING_SHADER_GROUP_TYPE_TRIANGLES_HIT_GROUP_KHR;
+        groups[i].generalShader = i < 2 ? i : VK_SHADER_UNUSED_KHR;
+        groups[i].closestHitShader = i < 2 ? VK_SHADER_UNUSED_KHR : i;
+        groups[i].anyHitShader = VK_SHADER_UNUSED_KHR;
+        groups[i].intersectionShader = VK_SHADER_UNUSED_KHR;
+    }
+    VkRayTracingPipelineCreateInfoKHR info = {VK_STRUCTURE_TYPE_RAY_TRACING_PIPELINE_CREATE_INFO_KHR};
+    info.stageCount = static_cast<uint32_t>(stages.size());
+    info.pStages = stages.data();
+    info.groupCount = static_cast<uint32_t>(groups.size());
+    info.pGroups = groups.data();
+    info.maxPipelineRayRecursionDepth = 1;
+    info.layout = rays.program.layout;
+    const VkResult result = vk.CreateRayTracingPipelinesKHR(device_, VK_NULL_HANDLE, VK_NULL_HANDLE, 1, &info, nullptr,
+                                                            &rays.program.pipeline);
+    for (const auto& stage : stages) vk.DestroyShaderModule(device_, stage.module, nullptr);
+    require(result, "vkCreateRayTracingPipelinesKHR");
+    own([this, pipeline = rays.program.pipeline] { vk.DestroyPipeline(device_, pipeline, nullptr); });
+
+    VkPhysicalDeviceRayTracingPipelinePropertiesKHR limits = {
+        VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_PROPERTIES_KHR};
+    VkPhysicalDeviceProperties2 properties = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2};
+    properties.pNext = &limits;
+    vk.GetPhysicalDeviceProperties2(adapter_, &properties);
+    const uint32_t size = limits.shaderGroupHandleSize;
+    const VkDeviceSize step = std::max(size, limits.shaderGroupBaseAlignment);
+    std::vector<std::byte> handles(3 * size_t(size));
+    require(vk.GetRayTracingShaderGroupHandlesKHR(device_, rays.program.pipeline, 0, 3, handles.size(), handles.data()),
+            "vkGetRayTracingShaderGroupHandlesKHR");
+    const RawBuffer table = createBuffer(
+        4 * step, VK_BUFFER_USAGE_SHADER_BINDING_TABLE_BIT_KHR | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT, true);
+    const VkDeviceSize first = (table.address + step - 1) / step * step - table.address;
+    const std::array regions = {&rays.generation, &rays.miss, &rays.hit};
+    for (uint32_t i = 0; i < 3; i++) {
+        std::copy_n(handles.data() + size_t(i) * size, size, table.mapped + first + i * step);
+        *regions[i] = {table.address + first + i * step, step, step};
+    }
+    return rays;
+}
+
 std::vector<VkDescriptorSet> RawDevice::createSets(const RawProgram& program,
                                                    std::span<const VkDescriptorSetLayoutBinding> bindings,
                                                    uint32_t count) {
@@ -336,6 +407,16 @@ std::vector<VkDescriptorSet> RawDevice::createSets(const RawProgram& program,
     std::vector<VkDescriptorSet> sets(count);
     require(vk.AllocateDescriptorSets(device_, &allocation, sets.data()), "vkAllocateDescriptorSets");
     return sets;
+}
+
+VkQueryPool RawDevice::createTimestamps(uint32_t count) {
+    VkQueryPoolCreateInfo info = {VK_STRUCTURE_TYPE_QUERY_POOL_CREATE_INFO};
+    info.queryType = VK_QUERY_TYPE_TIMESTAMP;
+    info.queryCount = count;
+    VkQueryPool pool = VK_NULL_HANDLE;
+    require(vk.CreateQueryPool(device_, &info, nullptr, &pool), "vkCreateQueryPool");
+    own([this, pool] { vk.DestroyQueryPool(device_, pool, nullptr); });
+    return pool;
 }
 
 RawAcceleration RawDevice::createAcceleration(VkAccelerationStructureTypeKHR type,

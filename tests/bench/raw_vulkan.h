@@ -82,7 +82,13 @@ namespace glint::bench {
     X(CmdBindVertexBuffers)           \
     X(CmdDraw)                        \
     X(CmdClearColorImage)             \
-    X(CmdCopyImageToBuffer)
+    X(CmdCopyImageToBuffer)           \
+    X(CmdCopyBuffer)                  \
+    X(CreateQueryPool)                \
+    X(DestroyQueryPool)               \
+    X(CmdResetQueryPool)              \
+    X(CmdWriteTimestamp2)             \
+    X(GetQueryPoolResults)
 
 #define GLINT_RAW_TRACING_FUNCTIONS(X)          \
     X(CreateAccelerationStructureKHR)           \
@@ -91,12 +97,18 @@ namespace glint::bench {
     X(GetAccelerationStructureDeviceAddressKHR) \
     X(CmdBuildAccelerationStructuresKHR)
 
+#define GLINT_RAW_PIPELINE_FUNCTIONS(X)   \
+    X(CreateRayTracingPipelinesKHR)       \
+    X(GetRayTracingShaderGroupHandlesKHR) \
+    X(CmdTraceRaysKHR)
+
 /// Entry points without their prefix: vk.CmdDispatch(...).
 struct RawFunctions {
 #define GLINT_RAW_DECLARE(name) PFN_vk##name name = nullptr;
     GLINT_RAW_INSTANCE_FUNCTIONS(GLINT_RAW_DECLARE)
     GLINT_RAW_DEVICE_FUNCTIONS(GLINT_RAW_DECLARE)
     GLINT_RAW_TRACING_FUNCTIONS(GLINT_RAW_DECLARE)
+    GLINT_RAW_PIPELINE_FUNCTIONS(GLINT_RAW_DECLARE)
 #undef GLINT_RAW_DECLARE
 };
 
@@ -137,9 +149,17 @@ struct RawGraphics {
     VkFormat color_format = VK_FORMAT_UNDEFINED;
 };
 
+/// A ray-tracing pipeline of one shader a kind, and its shader binding table.
+struct RawRays {
+    RawProgram program;
+    VkStridedDeviceAddressRegionKHR generation = {};
+    VkStridedDeviceAddressRegionKHR miss = {};
+    VkStridedDeviceAddressRegionKHR hit = {};
+};
+
 class RawDevice {
 public:
-    enum class Tracing { Off, On };
+    enum class Tracing { Off, On, Pipelines };
 
     /// Opens the first adapter with this name, any if it is empty.
     explicit RawDevice(std::string_view adapter, Tracing tracing = Tracing::Off);
@@ -155,8 +175,11 @@ public:
     VkSampler createSampler();
     RawProgram createKernel(std::span<const uint32_t> words, std::span<const VkDescriptorSetLayoutBinding> bindings);
     RawProgram createPipeline(const RawGraphics& desc);
+    RawRays createRays(std::span<const uint32_t> generation, std::span<const uint32_t> miss,
+                       std::span<const uint32_t> hit, std::span<const VkDescriptorSetLayoutBinding> bindings);
     std::vector<VkDescriptorSet> createSets(const RawProgram& program,
                                             std::span<const VkDescriptorSetLayoutBinding> bindings, uint32_t count);
+    VkQueryPool createTimestamps(uint32_t count);
     /// A structure with storage for `primitives` of a geometry.
     RawAcceleration createAcceleration(VkAccelerationStructureTypeKHR type,
                                        const VkAccelerationStructureGeometryKHR& geometry, uint32_t primitives);

@@ -3,6 +3,7 @@
 // a second of the builders, on the 1m mesh. tracing.leaks.software: rays at edges that slip through.
 
 #include "accuracy/embree.h"
+#include "bench/tracing_pipeline.h"
 #include "bench/tracing_scenes.h"
 #include "support/hierarchies.h"
 #include "support/reference.h"
@@ -24,12 +25,6 @@ using detail::BuildMode;
 using detail::Hierarchy;
 
 constexpr uint32_t rounds = 9;
-
-/// As the kernel writes it.
-struct BatchHit {
-    RayHit hit;
-    uint32_t unused;
-};
 
 /// A kernel over one set of rays.
 class Batch {

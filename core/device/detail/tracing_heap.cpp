@@ -58,8 +58,8 @@ TracingHeap::TracingHeap(DeviceObject& device) : device_(device), form_(chooseFo
     uint64_t bytes = features.maxBufferSize;
     if (form_ == HeapForm::Texels) bytes = std::min(bytes, features.maxTexels * texel_size);
     if (form_ == HeapForm::Storage) {
-        // Each of them is one binding of every shader with queries; Vulkan promises few.
-        constexpr uint64_t most = 8;
+        // Which of them it is, is a branch at every read: with eight, lavapipe takes minutes to compile a shader.
+        constexpr uint64_t most = 2;
         buffers_ = static_cast<uint32_t>(std::clamp<uint64_t>(bytes / heap_buffer_size, 1, most));
         bytes = std::min({bytes, buffers_ * heap_buffer_size, buffers_ * features.maxStorageSize});
     }

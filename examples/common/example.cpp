@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cmath>
 #include <cstdio>
 
 namespace {
+
+/// Seconds. Scenes are evaluated in float32, where moments beyond are more than 1/30 s apart.
+constexpr uint32_t longest_time = 500'000;
 
 /// "1600x900" to two numbers; the reason why not if it cannot.
 std::string parseSize(const std::string& text, uint32_t& width, uint32_t& height) {
@@ -57,8 +59,9 @@ Example::Example(std::string name, const std::string& description)
         app.add_option("--time", parser_->time, "Freeze the scene at this moment, in seconds")->type_name("SECONDS");
     parser_->time_option->check([](const std::string& text) {
         double value = 0.0;
-        const bool is_number = CLI::detail::lexical_cast(text, value) && std::isfinite(value) && value >= 0.0;
-        return is_number ? std::string() : "'" + text + "' is no number of seconds";
+        // Written so that NaN fails.
+        if (CLI::detail::lexical_cast(text, value) && value >= 0.0 && value <= longest_time) return std::string();
+        return fmt::format("'{}' is no number of seconds from 0 to {}", text, longest_time);
     });
     app.add_option("--image", options_.image, "Write the last frame to this file (.png)")->type_name("FILE");
     app.add_option("--stats", options_.stats, "Write times and counts to this file")->type_name("FILE.json");

@@ -31,7 +31,7 @@ struct ExampleOptions {
     uint32_t height = 900;
     uint32_t frames = 1;               ///< --frames N: how many to draw; 1 or more
     bool frames_given = false;         ///< else a window stays until it is closed
-    std::optional<double> time;        ///< --time SECONDS: every frame shows this moment; not negative
+    std::optional<double> time;        ///< --time SECONDS: every frame shows this moment; 0 to 500,000
     std::filesystem::path image;       ///< --image FILE: where to write the last frame; empty: nowhere
     std::filesystem::path stats;       ///< --stats FILE.json: where to write the statistics; empty: nowhere
     std::string adapter;               ///< --adapter N|NAME: index or part of a name; empty: the best

@@ -125,7 +125,7 @@ void NullControl::loseWindow() {
 
 WindowEvents NullControl::takeWindowEvents(const WindowEvents& before) {
     std::lock_guard lock(mutex_);
-    const WindowEvents events = window_events_.value_or(before);
+    WindowEvents events = window_events_.value_or(before);
     if (window_events_) {
         window_events_->close = false;
         window_events_->pressed_buttons.reset();

@@ -94,6 +94,8 @@ TEST(Example, WrongArgumentsEndWithTwo) {
                                                          {"--time", "-1"},
                                                          {"--time", "nan"},
                                                          {"--time", "inf"},
+                                                         {"--time", "500001"},
+                                                         {"--time", "1e300"},
                                                          {"--time", "soon"},
                                                          {"--tracing", "magic"},
                                                          {"--screenshot"},

@@ -1,24 +1,19 @@
 #include "common/device.h"
 
-#include <cstdio>
-
 using namespace glint;
 
 Device openDevice(Example& example, FeatureMask required) {
     const ExampleOptions& options = example.options();
     const bool traces = required & (FeatureComputeTracing | FeatureFragmentTracing | FeatureRayTracing);
-    if (traces && options.tracing == "software") {
-        std::fprintf(stderr, "--tracing software: this version traces with the driver only\n");
-        return Device();
-    }
-    Device device = Device::create({.api = options.api, .adapter = options.adapter, .required = required});
+    Device device = Device::create(
+        {.api = options.api, .adapter = options.adapter, .required = required, .tracing = options.tracing});
     if (!device) return device;
     Statistics& statistics = example.statistics();
     const DeviceInfo& info = device.getInfo();
     statistics.adapter = info.name;
     statistics.driver = info.driver;
     statistics.api = info.api + " " + info.version;
-    if (traces) statistics.tracing = "driver";
+    if (traces) statistics.tracing = toString(device.getFeatures().tracingEngine);
     for (uint32_t i = 0; i < FeatureCount; i++)
         if (device.getFeatures().has(1ull << i)) statistics.features.push_back(featureNames(1ull << i));
     return device;

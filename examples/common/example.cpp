@@ -37,7 +37,7 @@ glint::Status makeFolder(const std::filesystem::path& file) {
 
 struct Example::Parser {
     CLI::App app;
-    std::string size;
+    std::string size, tracing;
     double time = 0.0;
     CLI::Option* time_option = nullptr;
     CLI::Option* frames_option = nullptr;
@@ -67,13 +67,10 @@ Example::Example(std::string name, const std::string& description)
     app.add_option("--stats", options_.stats, "Write times and counts to this file")->type_name("FILE.json");
     app.add_option("--adapter", options_.adapter, "Adapter: its index or a part of its name")->type_name("N|NAME");
     app.add_option("--api", options_.api, "Graphics API")->type_name("NAME");
-    app.add_option("--tracing", options_.tracing, "Engine for ray tracing")
+    app.add_option("--tracing", parser_->tracing, "Engine for ray tracing")
         ->type_name("auto|driver|software")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            const bool is_known = text == "auto" || text == "driver" || text == "software";
-            return is_known ? std::string() : "'" + text + "' is none of auto, driver, software";
-        });
+        ->default_str("auto")
+        ->check([this](const std::string& text) { return parseTracingEngine(text, options_.tracing); });
     app.add_flag("--window", options_.window,
                  "Show the frames in a window, until it is closed or --frames are drawn; without a display as without "
                  "this argument");
@@ -177,6 +174,16 @@ int Example::finish() {
     if (glint::Status status = makeFolder(options_.stats); !status) return report(status.error());
     if (glint::Status status = statistics_.write(options_.stats); !status) return report(status.error());
     return 0;
+}
+
+std::string parseTracingEngine(const std::string& text, glint::TracingEngine& engine) {
+    using glint::TracingEngine;
+    for (const TracingEngine known : {TracingEngine::Auto, TracingEngine::Driver, TracingEngine::Software}) {
+        if (text != toString(known)) continue;
+        engine = known;
+        return {};
+    }
+    return "'" + text + "' is none of auto, driver, software";
 }
 
 int report(const glint::Error& error) {

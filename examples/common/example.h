@@ -15,6 +15,7 @@
 
 #include <glint/base/error.h>
 #include <glint/base/status.h>
+#include <glint/device/features.h>
 #include <glint/format/image.h>
 
 #include <cstdint>
@@ -29,15 +30,15 @@
 struct ExampleOptions {
     uint32_t width = 1600;  ///< --size WxH, texels: each from 1 to 16384
     uint32_t height = 900;
-    uint32_t frames = 1;               ///< --frames N: how many to draw; 1 or more
-    bool frames_given = false;         ///< else a window stays until it is closed
-    std::optional<double> time;        ///< --time SECONDS: every frame shows this moment; 0 to 500,000
-    std::filesystem::path image;       ///< --image FILE: where to write the last frame; empty: nowhere
-    std::filesystem::path stats;       ///< --stats FILE.json: where to write the statistics; empty: nowhere
-    std::string adapter;               ///< --adapter N|NAME: index or part of a name; empty: the best
-    std::string api;                   ///< --api NAME; empty: the default
-    std::string tracing = "auto";      ///< --tracing auto|driver|software
-    bool window = false;               ///< --window
+    uint32_t frames = 1;          ///< --frames N: how many to draw; 1 or more
+    bool frames_given = false;    ///< else a window stays until it is closed
+    std::optional<double> time;   ///< --time SECONDS: every frame shows this moment; 0 to 500,000
+    std::filesystem::path image;  ///< --image FILE: where to write the last frame; empty: nowhere
+    std::filesystem::path stats;  ///< --stats FILE.json: where to write the statistics; empty: nowhere
+    std::string adapter;          ///< --adapter N|NAME: index or part of a name; empty: the best
+    std::string api;              ///< --api NAME; empty: the default
+    glint::TracingEngine tracing = glint::TracingEngine::Auto;  ///< --tracing auto|driver|software
+    bool window = false;                                        ///< --window
     std::filesystem::path screenshot;  ///< --screenshot FILE: where to write what a window shows last; empty: nowhere
 };
 
@@ -110,6 +111,10 @@ private:
     double start_ = 0.0;
     int exit_code_ = 0;
 };
+
+/// Sets the engine that a text names: "auto", "driver" or "software". Otherwise says what is wrong; empty if nothing
+/// is.
+std::string parseTracingEngine(const std::string& text, glint::TracingEngine& engine);
 
 /// Prints the error on stderr and returns 1: `return report(status.error());`
 int report(const glint::Error& error);

@@ -32,7 +32,7 @@ struct Options {
     std::filesystem::path stats;
     std::string adapter;
     std::string api;
-    std::string tracing = "auto";
+    TracingEngine tracing = TracingEngine::Auto;
     uint32_t mask = 0xff;
     bool any = false;
 };
@@ -133,6 +133,7 @@ struct Outcome {
     uint64_t instances = 0;
     uint64_t tracing_bytes = 0;
     DeviceInfo info;
+    TracingEngine engine = TracingEngine::Driver;
     Seconds seconds;
 };
 
@@ -155,7 +156,8 @@ Status writeStatistics(const Options& options, const Outcome& outcome) {
           {"read", seconds.read},
           {"write", seconds.write}}},
         {"tracing_bytes", outcome.tracing_bytes},
-        {"tracing", "driver"},
+        {"tracing", toString(outcome.engine)},
+        {"tracing_reason", outcome.info.tracing},
         {"adapter", outcome.info.name},
         {"driver", outcome.info.driver},
         {"api", outcome.info.api + " " + outcome.info.version},
@@ -240,9 +242,11 @@ Expected<RayCaster> createCaster(const Options& options, Outcome& outcome) {
                                           .adapter = options.adapter,
                                           .required = FeatureComputeTracing,
                                           .optional = FeatureTimestamps,
+                                          .tracing = options.tracing,
                                           .message = tell});
     if (!device) return unexpected(device.error());
     outcome.info = device.getInfo();
+    outcome.engine = device.getFeatures().tracingEngine;
     Expected<RayCaster> caster = RayCaster::create(device, (*target)->meshes, (*target)->instances);
     if (!caster) return caster;
     caster->setMask(static_cast<uint8_t>(options.mask));
@@ -267,8 +271,6 @@ Expected<Outcome> cast(const Options& options) {
 }
 
 int run(const Options& options) {
-    if (options.tracing == "software")
-        return failUsage("cast", "--tracing software: this version traces with the driver only");
     catchSignals();
     const Expected<Outcome> outcome = cast(options);
     if (!outcome) {

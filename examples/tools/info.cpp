@@ -19,6 +19,7 @@ namespace {
 struct Options {
     std::string api;
     std::string adapter;
+    TracingEngine tracing = TracingEngine::Auto;
     bool json = false;
 };
 
@@ -76,13 +77,14 @@ struct Adapter {
     Error error;
 };
 
-Adapter open(const DeviceInfo& info, const std::string& api) {
-    const Device device = Device::create({.api = api,
+Adapter open(const DeviceInfo& info, const Options& options) {
+    const Device device = Device::create({.api = options.api,
                                           .adapter = std::to_string(info.index),
+                                          .tracing = options.tracing,
                                           .validation = DeviceDesc::Validation::Off,
                                           .message = [](const Message&) {}});
     if (!device) return {info, {}, device.error()};
-    return {info, device.getFeatures(), {}};
+    return {device.getInfo(), device.getFeatures(), {}};
 }
 
 nlohmann::ordered_json toJson(const Adapter& adapter) {
@@ -95,6 +97,7 @@ nlohmann::ordered_json toJson(const Adapter& adapter) {
         json["error"] = adapter.error.text();
         return json;
     }
+    json["tracing"] = info.tracing;
     json["memory_bytes"] = adapter.features.videoMemory;
     json["timestamp_period_ns"] = adapter.features.timestampPeriod;
     for (const Limit& limit : limitsOf(adapter.features)) json["limits"][limit.name] = limit.value;
@@ -122,6 +125,7 @@ void print(const Adapter& adapter) {
         fmt::print("  cannot be opened: {}\n\n", adapter.error.text());
         return;
     }
+    fmt::print("  tracing    {}\n", info.tracing);
     fmt::print("  memory     {:.1f} GiB\n", static_cast<double>(adapter.features.videoMemory) / (1ull << 30));
     fmt::print("  limits\n");
     for (const Limit& limit : limitsOf(adapter.features))
@@ -136,7 +140,7 @@ int run(const Options& options) {
         for (const DeviceInfo& info : *found) {
             const bool wanted = options.adapter.empty() || options.adapter == std::to_string(info.index) ||
                                 info.name.find(options.adapter) != std::string::npos;
-            if (wanted) adapters.push_back(open(info, options.api));
+            if (wanted) adapters.push_back(open(info, options));
         }
     }
     if (options.json) {
@@ -163,6 +167,7 @@ Command infoCommand(CLI::App& app) {
     sub->add_option("--adapter", options->adapter, "Only this adapter: its index or a part of its name")
         ->type_name("N|NAME");
     sub->add_option("--api", options->api, "Graphics API")->type_name("NAME");
+    addTracing(*sub, options->tracing);
     return {sub, [options] { return run(*options); }};
 }
 

@@ -2,6 +2,8 @@
 
 #include "tool.h"
 
+#include "common/example.h"
+
 #include <fmt/format.h>
 
 #include <array>
@@ -27,14 +29,13 @@ bool isFailure(const glint::Error& error) {
 
 }  // namespace
 
-void addTracing(CLI::App& app, std::string& value) {
-    app.add_option("--tracing", value, "Engine for ray tracing")
+void addTracing(CLI::App& app, glint::TracingEngine& engine) {
+    // The check has it before the function is called.
+    app.add_option_function<std::string>(
+           "--tracing", [](const std::string&) {}, "Engine for ray tracing")
         ->type_name("auto|driver|software")
-        ->capture_default_str()
-        ->check([](const std::string& text) {
-            const bool is_known = text == "auto" || text == "driver" || text == "software";
-            return is_known ? std::string() : "'" + text + "' is none of auto, driver, software";
-        });
+        ->default_str("auto")
+        ->check([&engine](const std::string& text) { return parseTracingEngine(text, engine); });
 }
 
 int fail(const char* command, const glint::Error& error) {

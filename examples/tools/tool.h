@@ -3,6 +3,7 @@
 // What the subcommands of `glint` share.
 
 #include <glint/base/error.h>
+#include <glint/device/features.h>
 
 #include <CLI/CLI.hpp>
 
@@ -30,7 +31,7 @@ Command shaderCommand(CLI::App& app);
 Command castCommand(CLI::App& app);
 
 /// Adds --tracing auto|driver|software: the engine for ray tracing.
-void addTracing(CLI::App& app, std::string& value);
+void addTracing(CLI::App& app, glint::TracingEngine& engine);
 
 /// Prints "glint cast: what went wrong [id]" on stderr and returns the status that fits.
 int fail(const char* command, const glint::Error& error);

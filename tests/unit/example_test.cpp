@@ -40,7 +40,7 @@ TEST(Example, Defaults) {
     EXPECT_EQ(example.height(), 900u);
     EXPECT_EQ(example.options().frames, 1u);
     EXPECT_FALSE(example.options().time);
-    EXPECT_EQ(example.options().tracing, "auto");
+    EXPECT_EQ(example.options().tracing, TracingEngine::Auto);
     EXPECT_DOUBLE_EQ(example.time(30), 0.5);
 }
 
@@ -71,7 +71,7 @@ TEST(Example, EveryArgument) {
     EXPECT_EQ(example.options().stats, "b.json");
     EXPECT_EQ(example.options().adapter, "llvm");
     EXPECT_EQ(example.options().api, "vulkan");
-    EXPECT_EQ(example.options().tracing, "software");
+    EXPECT_EQ(example.options().tracing, TracingEngine::Software);
     EXPECT_EQ(mesh, "m.obj");
     EXPECT_EQ(count, 7u);
     EXPECT_EQ(scale, 0.5f);

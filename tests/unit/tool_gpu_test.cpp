@@ -159,6 +159,14 @@ TEST_F(Tool, Info) {
     EXPECT_GT(json[0]["memory_bytes"].get<uint64_t>(), 0u);
     EXPECT_GE(json[0]["limits"]["maxGroupThreads"].get<uint64_t>(), 128u);
     EXPECT_NE(table.output.find(json[0]["name"].get<std::string>()), std::string::npos);
+    EXPECT_NE(table.output.find(json[0]["tracing"].get<std::string>()), std::string::npos);
+    for (const std::string engine : {"software", "driver"}) {
+        if (engine == "driver" && json[0]["features"].dump().find("computeTracing") == std::string::npos) continue;
+        const auto picked =
+            nlohmann::json::parse(expectSuccess("info --json --tracing " + engine).output, nullptr, false);
+        EXPECT_TRUE(picked[0]["tracing"].get<std::string>().starts_with(engine)) << picked[0]["tracing"];
+    }
+    expectFailure("info --tracing magic", 2, "tool.arguments");
     expectFailure("info --adapter nonesuch", 1, "device.no_adapter");
     expectFailure("info", 1, "device.no_driver", "VK_DRIVER_FILES=/nonexistent VK_ICD_FILENAMES=/nonexistent");
     EXPECT_EQ(run("info --json", "VK_DRIVER_FILES=/nonexistent VK_ICD_FILENAMES=/nonexistent").output, "[]\n");
@@ -349,6 +357,15 @@ TEST_F(Tool, CastsAtScenes) {
     const HitComparison result =
         compareHits(ReferenceHierarchy(mesh), plain, std::vector(hits.begin(), hits.begin() + 1000));
     EXPECT_EQ(result.wrong, 0u) << result.first;
+    // By either engine, where there are both: ties apart, the same.
+    for (const char* engine : {"driver", "software"}) {
+        if (run(std::string("cast scene.json rays.npy other.npy --tracing ") + engine).status != 0) continue;
+        const std::vector<RayHit> other = cast(std::string("--tracing ") + engine + " --stats stats.json");
+        EXPECT_EQ(nlohmann::json::parse(*readTextFile(dir / "stats.json"))["tracing"], engine);
+        const HitComparison same =
+            compareHits(ReferenceHierarchy(mesh), plain, std::vector(other.begin(), other.begin() + 1000));
+        EXPECT_EQ(same.wrong, 0u) << engine << ": " << same.first;
+    }
     // Those that see the first, with the first alone.
     const std::vector<RayHit> masked = cast("--mask 1");
     EXPECT_TRUE(std::equal(hits.begin(), hits.begin() + 1000, masked.begin()));

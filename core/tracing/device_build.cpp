@@ -80,9 +80,9 @@ public:
         const uint32_t sort_tiles = tiles(primitives_, sort_tile);
         const uint32_t scan_tiles = tiles(primitives_, scan_tile);
         common_.boxes = take(6 * uint64_t(primitives_));
-        uint32_t keys = take(2 * uint64_t(primitives_));
-        uint32_t other = take(2 * uint64_t(primitives_));
-        common_.nodes = take(16 * uint64_t(primitives_));
+        uint32_t keys = take(2 * std::max<uint64_t>(primitives_, 1));
+        uint32_t other = take(2 * std::max<uint64_t>(primitives_, 1));
+        common_.nodes = take(16 * std::max<uint64_t>(primitives_, 1));
         common_.list = take(nodes);
         common_.counts = take(std::max(digits * uint64_t(sort_tiles), 2 * uint64_t(scan_tiles)));
         common_.tie_bits = static_cast<uint32_t>(std::bit_width(std::max(primitives_, 1u) - 1));
@@ -103,18 +103,20 @@ public:
                 addGroups(BuildKernel::SortScatter, sort_tiles);
                 std::swap(keys, other);
             }
-            common_.keys = keys;
-            // What the last pass has read from is free.
-            common_.sums = other;
-            add(BuildKernel::Tree, primitives_);
+        }
+        common_.keys = keys;
+        // What the last pass has read from is free.
+        common_.sums = other;
+        add(BuildKernel::Tree, primitives_);
+        if (primitives_ > 1) {
             for (common_.step = 0; common_.step < common_.levels; common_.step++)
-                add(BuildKernel::Collapse, std::min(nodes, levelLimit(common_.step)));
+                add(BuildKernel::Collapse, std::min(nodes, levelThreads(common_.step)));
             common_.count = scan_tiles;
             addGroups(BuildKernel::ScanSum, scan_tiles);
             addGroups(BuildKernel::SortScan, 2);
             addGroups(BuildKernel::ScanApply, scan_tiles);
-            add(BuildKernel::Place, primitives_);
         }
+        add(BuildKernel::Place, primitives_);
         add(BuildKernel::Header, 1);
         add(BuildKernel::Nodes, nodes);
         addRecords(BuildKernel::TriangleRecords, BuildKernel::BoxRecords, false);
@@ -138,9 +140,9 @@ public:
     }
 
 private:
-    /// Nodes of a level: eight times as many as of the one above. How many there are is not known here, so of the lower
-    /// levels each thread takes several if it comes to that.
-    static uint32_t levelLimit(uint32_t level) { return 1u << std::min(3 * level, 16u); }
+    /// Threads for a level of nodes. How many nodes it has is not known here: the first levels have up to eight times
+    /// as many as the one above; the last ones are seldom reached, and each thread takes several if they are.
+    static uint32_t levelThreads(uint32_t level) { return level <= 9 ? 1u << std::min(3 * level, 16u) : 1u << 12; }
 
     BuildPass& add(BuildKernel kernel, uint32_t threads) {
         BuildPass& pass = plan_.passes.emplace_back();

@@ -4,7 +4,7 @@
 //   0, 1    children: another's index, or GLINT_LEAF and a place among the sorted primitives
 //   2 - 7   box
 //   8 - 14  costs: the least sum of areas of the nodes below, if it gives its parent at most 1 .. 7 children
-//   15      where the subtree that came first ends
+//   15      where the subtree that came first ends; then how the node gives out children: see tree.h
 //
 // and, once it has been chosen to become a node: 8 - 15 that node's children, leaves first, ended by GLINT_NONE; 0 the
 // node's place.
@@ -13,8 +13,8 @@
 #include <glint/tracing/build/common.h>
 
 const uint GLINT_BINARY_BOX = 2u;
-const uint GLINT_BINARY_COSTS = 8u;
 const uint GLINT_BINARY_END = 15u;
+const uint GLINT_BINARY_DECISIONS = 15u;
 const uint GLINT_BINARY_CHILDREN = 8u;
 const uint GLINT_WIDTH = 8u;
 
@@ -54,28 +54,10 @@ uint glintHeightBound(uint g) {
     return difference >= 0x40000000u ? build.tie_bits + bit : bit;
 }
 
-// Index i - 1: for at most i children.
-struct GlintCosts {
-    float costs[7];
-};
-GlintCosts glintCosts(uint child) {
-    GlintCosts result;
-    for (uint i = 0u; i < 7u; i++)
-        result.costs[i] =
-            glintIsLeaf(child) ? 0.0 : uintBitsToFloat(scratch[glintBinary(child) + GLINT_BINARY_COSTS + i]);
-    return result;
-}
-
-// The cheapest way to give i children, 2 to 8, of two subtrees: the cost, and how many are the left one's.
-float glintDistribute(GlintCosts left, GlintCosts right, uint i, out uint best_left) {
-    float best = GLINT_MOST;
-    best_left = 1u;
-    for (uint k = 1u; k < i; k++) {
-        const float cost = left.costs[k - 1u] + right.costs[i - k - 1u];
-        if (cost < best) {
-            best = cost;
-            best_left = k;
-        }
-    }
-    return best;
+// Nodes to come, on all levels. There is one at least: tree.h makes the root of no primitive or one look like a node
+// that has been chosen.
+uint glintListed() {
+    uint listed = 0u;
+    for (uint level = 0u; level < build.levels; level++) listed += scratch[GLINT_STATE_LISTED + level];
+    return max(listed, 1u);
 }

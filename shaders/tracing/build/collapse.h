@@ -4,50 +4,37 @@
 
 #include <glint/tracing/build/binary.h>
 
-uint children[GLINT_WIDTH];
+// Of the node on its way: the first one's word, and how many there are. They take the place of the node's own costs and
+// decisions, which nobody needs any more.
+uint children;
 uint child_count;
 
 uint glintLeft(uint node) { return scratch[glintBinary(node)]; }
 uint glintRight(uint node) { return scratch[glintBinary(node) + 1u]; }
 
-void glintAddChild(uint child) { children[child_count++] = child; }
+void glintAddChild(uint child) { scratch[children + child_count++] = child; }
 
-// The cheapest, by the costs.
+// The cheapest, as tree.h has decided.
 void glintCollect(uint root) {
+    // To be opened or not, and how many children each may become, four bits each.
     uint waiting[GLINT_WIDTH];
-    uint most_of[GLINT_WIDTH];
+    uint most_of = GLINT_WIDTH;
     uint stacked = 1u;
     waiting[0] = root;
-    most_of[0] = GLINT_WIDTH;
-    child_count = 0u;
     while (stacked > 0u) {
-        stacked--;
-        const uint child = waiting[stacked];
-        uint most = most_of[stacked];
-        if (glintIsLeaf(child) || most == 1u) {
+        const uint child = waiting[--stacked];
+        const uint most = most_of & 15u;
+        most_of >>= 4;
+        uint left = 0u;
+        if (most > 1u && !glintIsLeaf(child))
+            left = scratch[glintBinary(child) + GLINT_BINARY_DECISIONS] >> 3u * (most - 2u) & 7u;
+        if (left == 0u) {
             glintAddChild(child);
-            continue;
+        } else {
+            waiting[stacked++] = glintRight(child);
+            waiting[stacked++] = glintLeft(child);
+            most_of = most_of << 8 | (most - left) << 4 | left;
         }
-        const uint left_child = glintLeft(child);
-        const uint right_child = glintRight(child);
-        const GlintCosts left = glintCosts(left_child);
-        const GlintCosts right = glintCosts(right_child);
-        uint left_most;
-        float cost = glintDistribute(left, right, most, left_most);
-        // As cheap with fewer.
-        while (most > 1u && most < GLINT_WIDTH &&
-               uintBitsToFloat(scratch[glintBinary(child) + GLINT_BINARY_COSTS + most - 2u]) <= cost) {
-            most--;
-            if (most > 1u) cost = glintDistribute(left, right, most, left_most);
-        }
-        if (most == 1u) {
-            glintAddChild(child);
-            continue;
-        }
-        waiting[stacked] = right_child;
-        most_of[stacked++] = most - left_most;
-        waiting[stacked] = left_child;
-        most_of[stacked++] = left_most;
     }
 }
 
@@ -57,19 +44,32 @@ void glintOpen(bool highest, float scale) {
         uint best = GLINT_NONE;
         float most = -1.0;
         for (uint i = 0u; i < child_count; i++) {
-            if (glintIsLeaf(children[i])) continue;
-            const float value = highest ? float(glintHeightBound(children[i]))
-                                        : glintHalfArea(glintChildBox(children[i]), scale);
+            const uint child = scratch[children + i];
+            if (glintIsLeaf(child)) continue;
+            const float value =
+                highest ? float(glintHeightBound(child)) : glintHalfArea(glintChildBox(child), scale);
             if (value > most) {
                 best = i;
                 most = value;
             }
         }
         if (best == GLINT_NONE) return;
-        const uint opened = children[best];
-        children[best] = glintLeft(opened);
+        const uint opened = scratch[children + best];
+        scratch[children + best] = glintLeft(opened);
         glintAddChild(glintRight(opened));
     }
+}
+
+// Leaves first, in the order that they have. Returns how many there are.
+uint glintPartition() {
+    uint leaves = 0u;
+    for (uint c = 0u; c < child_count; c++) {
+        const uint child = scratch[children + c];
+        if (!glintIsLeaf(child)) continue;
+        for (uint to = c; to > leaves; to--) scratch[children + to] = scratch[children + to - 1u];
+        scratch[children + leaves++] = child;
+    }
+    return leaves;
 }
 
 void main() {
@@ -81,33 +81,28 @@ void main() {
     const uint levels_left = build.levels - 1u - build.step;
     GLINT_FOR(i, listed) {
         const uint node = scratch[begin + i];
+        children = glintBinary(node) + GLINT_BINARY_CHILDREN;
+        child_count = 0u;
         glintCollect(node);
         // So that no more than 4/7 of a node is there for each primitive: docs/tracing.md.
         glintOpen(false, scale);
         uint height = 0u;
         for (uint c = 0u; c < child_count; c++) {
-            if (!glintIsLeaf(children[c])) height = max(height, glintHeightBound(children[c]));
+            const uint child = scratch[children + c];
+            if (!glintIsLeaf(child)) height = max(height, glintHeightBound(child));
         }
         if (height > 3u * levels_left) {
-            children[0] = node;
+            scratch[children] = node;
             child_count = 1u;
             glintOpen(true, scale);
         }
-        uint written = 0u;
-        const uint to = glintBinary(node) + GLINT_BINARY_CHILDREN;
-        for (uint c = 0u; c < child_count; c++) {
-            if (glintIsLeaf(children[c])) scratch[to + written++] = children[c];
-        }
-        const uint leaves = written;
-        for (uint c = 0u; c < child_count; c++) {
-            if (!glintIsLeaf(children[c])) scratch[to + written++] = children[c];
-        }
-        for (uint c = child_count; c < GLINT_WIDTH; c++) scratch[to + c] = GLINT_NONE;
+        const uint leaves = glintPartition();
+        for (uint c = child_count; c < GLINT_WIDTH; c++) scratch[children + c] = GLINT_NONE;
         const uint inner = child_count - leaves;
         scratch[build.sums + 2u * node] = inner;
         scratch[build.sums + 2u * node + 1u] = leaves;
         if (inner == 0u) continue;
         const uint place = next + atomicAdd(scratch[GLINT_STATE_LISTED + build.step + 1u], inner);
-        for (uint c = 0u; c < inner; c++) scratch[place + c] = scratch[to + leaves + c];
+        for (uint c = 0u; c < inner; c++) scratch[place + c] = scratch[children + leaves + c];
     }
 }

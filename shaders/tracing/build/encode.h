@@ -33,68 +33,68 @@ struct GlintNodeTexels {
     uvec4 texels[4];
 };
 
-// `count` children, the leaves first. An empty box becomes a point of the node.
-GlintNodeTexels glintEncode(GlintGrid grid, GlintBox boxes[8], uint count, uint leaves, uint first_node,
-                            uint first_record) {
-    uvec3 low[8];
-    uvec3 high[8];
+// The box of a child of the node to encode; an empty one becomes a point of the node. Whoever includes this defines it.
+GlintBox glintNodeChild(uint s);
+
+// `count` children, the leaves first. All three axes at once, and boxes are read twice: arrays of them would take longer
+// to compile and to run.
+GlintNodeTexels glintEncode(GlintGrid grid, uint count, uint leaves, uint first_node, uint first_record) {
     uvec3 all_low = uvec3(0xffffffffu);
     uvec3 all_high = uvec3(0u);
     for (uint s = 0u; s < count; s++) {
-        if (glintIsEmpty(boxes[s])) continue;
-        low[s] = glintBelow(grid, boxes[s].low);
-        high[s] = glintAbove(grid, boxes[s].high);
-        all_low = min(all_low, low[s]);
-        all_high = max(all_high, high[s]);
+        const GlintBox box = glintNodeChild(s);
+        if (glintIsEmpty(box)) continue;
+        all_low = min(all_low, glintBelow(grid, box.low));
+        all_high = max(all_high, glintAbove(grid, box.high));
     }
-    GlintNodeTexels node;
-    for (uint i = 0u; i < 4u; i++) node.texels[i] = uvec4(0u);
-    uvec3 origins = uvec3(0u);
-    uvec3 exponents = uvec3(0u);
+    uvec3 origin = uvec3(0u);
+    uvec3 exponent = uvec3(0u);
+    uvec3 planes[4];  // of the children 0-3 and 4-7: low ones, high ones
+    for (uint i = 0u; i < 4u; i++) planes[i] = uvec3(0u);
     if (all_low.x <= all_high.x) {
-        for (uint axis = 0u; axis < 3u; axis++) {
-            // The smallest scale whose 255th plane, counted from a step that is one scale below everything, is not
-            // below anything.
-            uint exponent = uint(max(findMSB(all_high[axis] - all_low[axis]) - 15, 0));
-            uint shift = exponent + 8u;
-            uint origin = (all_low[axis] - (1u << shift)) >> 10;
-            while ((origin << 10) + (255u << shift) < all_high[axis]) {
-                exponent++;
-                shift++;
-                origin = (all_low[axis] - (1u << shift)) >> 10;
+        // The smallest scale whose 255th plane, counted from a step that is one scale below everything, is not below
+        // anything. With the highest bit of the extent, m, 254 scales of 2^(m - 7) may just not do; twice that does.
+        exponent = uvec3(max(findMSB(all_high - all_low) - 15, ivec3(0)));
+        origin = (all_low - (uvec3(256u) << exponent)) >> 10;
+        exponent += uvec3(lessThan((origin << 10) + (uvec3(65280u) << exponent), all_high));
+        origin = (all_low - (uvec3(256u) << exponent)) >> 10;
+        const uvec3 base = origin << 10;
+        const uvec3 shift = exponent + 8u;
+        const uvec3 rest = (uvec3(1u) << shift) - 1u;
+        uvec3 low_word = uvec3(0u);
+        uvec3 high_word = uvec3(0u);
+        for (uint s = 0u; s < count; s++) {
+            const GlintBox box = glintNodeChild(s);
+            uvec3 from = all_low - base;
+            uvec3 to = from;
+            if (!glintIsEmpty(box)) {
+                from = glintBelow(grid, box.low) - base;
+                to = glintAbove(grid, box.high) - base;
             }
-            const uint base = origin << 10;
-            uvec4 planes = uvec4(0u);
-            for (uint s = 0u; s < count; s++) {
-                const bool empty = glintIsEmpty(boxes[s]);
-                const uint from = (empty ? all_low[axis] : low[s][axis]) - base;
-                const uint to = (empty ? all_low[axis] : high[s][axis]) - base;
-                // What the bytes before this one add to the plane, in units: from above for the low plane, from below
-                // for the high one.
-                const uint bits = 8u * (s & 3u);
-                const uint before = (1u << bits) - 1u;
-                const uint low_bits = planes[s / 4u] & before;
-                const uint high_bits = planes[2u + s / 4u] & before;
-                uint low_part = low_bits << (max(shift, bits) - bits);
-                uint high_part = high_bits << (max(shift, bits) - bits);
-                if (bits > shift) {
-                    low_part = (low_bits + (1u << (bits - shift)) - 1u) >> (bits - shift);
-                    high_part = high_bits >> (bits - shift);
-                }
-                const uint below = (from - low_part) >> shift;
-                const uint above = (to - high_part + (1u << shift) - 1u) >> shift;
-                planes[s / 4u] |= (below ^ 128u) << bits;
-                planes[2u + s / 4u] |= (above ^ 128u) << bits;
+            // What the bytes before this one add to the plane, in units: from above for the low plane, from below for
+            // the high one.
+            const uint bits = 8u * (s & 3u);
+            const uvec3 up = max(shift, uvec3(bits)) - bits;
+            const uvec3 down = max(shift, uvec3(bits)) - shift;
+            const uvec3 low_part = ((low_word << up) + (uvec3(1u) << down) - 1u) >> down;
+            const uvec3 high_part = (high_word << up) >> down;
+            low_word |= ((from - low_part) >> shift ^ 128u) << bits;
+            high_word |= ((to - high_part + rest) >> shift ^ 128u) << bits;
+            if (bits == 24u || s + 1u == count) {
+                planes[s < 4u ? 0 : 1] = low_word;
+                planes[s < 4u ? 2 : 3] = high_word;
+                low_word = uvec3(0u);
+                high_word = uvec3(0u);
             }
-            node.texels[1u + axis] = planes;
-            origins[axis] = origin;
-            exponents[axis] = exponent;
         }
     }
-    node.texels[0] = uvec4(origins.x | exponents.x << 20 | (origins.z & 255u) << 24,
-                           origins.y | exponents.y << 20 | (origins.z >> 8 & 255u) << 24,
+    GlintNodeTexels node;
+    node.texels[0] = uvec4(origin.x | exponent.x << 20 | (origin.z & 255u) << 24,
+                           origin.y | exponent.y << 20 | (origin.z >> 8 & 255u) << 24,
                            leaves | count << 4 | (first_node - leaves) << 8,
-                           origins.z >> 16 | exponents.z << 4 | first_record << 8);
+                           origin.z >> 16 | exponent.z << 4 | first_record << 8);
+    for (uint axis = 0u; axis < 3u; axis++)
+        node.texels[1u + axis] = uvec4(planes[0][axis], planes[1][axis], planes[2][axis], planes[3][axis]);
     return node;
 }
 

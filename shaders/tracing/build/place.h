@@ -4,12 +4,6 @@
 
 #include <glint/tracing/build/binary.h>
 
-uint glintListed() {
-    uint listed = 0u;
-    for (uint level = 0u; level < build.levels; level++) listed += scratch[GLINT_STATE_LISTED + level];
-    return listed;
-}
-
 void main() {
     const uint present = scratch[GLINT_STATE_ACTIVE];
     GLINT_FOR(i, glintListed()) {
@@ -30,6 +24,6 @@ void main() {
         }
     }
     GLINT_FOR(i, build.primitives) {
-        if (i >= present || present == 1u) scratch[build.keys + 2u * glintPrimitiveAt(i)] = i >= present ? GLINT_NONE : 0u;
+        if (i >= present) scratch[build.keys + 2u * glintPrimitiveAt(i)] = GLINT_NONE;
     }
 }

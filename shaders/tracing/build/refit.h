@@ -56,30 +56,32 @@ GlintBox glintRecordBox(uint texel) {
     return GlintBox(min(min(a, b), c), max(max(a, b), c));
 }
 
+// The node on its way: words 2 and 3, and the first record of all.
+uvec2 header;
+uint records;
+
+GlintBox glintNodeChild(uint s) {
+    if (s < (header.x & 15u)) return glintRecordBox(records + 3u * ((header.y >> 8) + s));
+    return glintScratchBox(glintNodeWord((header.x >> 8) + s & 0xffffffu));
+}
+
 void main() {
     const GlintGrid grid = glintGrid(GLINT_TRACING_LOAD(build.hierarchy));
     const uvec4 places = GLINT_TRACING_LOAD(build.hierarchy + 1u);
+    records = build.hierarchy + places.z;
     GLINT_FOR(i, places.y) {
         uint node = i + 1u;
-        uvec2 header = GLINT_TRACING_LOAD(build.hierarchy + 4u * node).zw;
+        header = GLINT_TRACING_LOAD(build.hierarchy + 4u * node).zw;
         if ((header.x & 15u) != (header.x >> 4 & 15u)) continue;
         for (;;) {
             const uint leaves = header.x & 15u;
             const uint count = header.x >> 4 & 15u;
-            const uint first_record = header.y >> 8;
-            GlintBox boxes[8];
-            GlintBox box = GLINT_EMPTY;
-            for (uint s = 0u; s < count; s++) {
-                if (s < leaves)
-                    boxes[s] = glintRecordBox(build.hierarchy + places.z + 3u * (first_record + s));
-                else
-                    boxes[s] = glintScratchBox(glintNodeWord((header.x >> 8) + s & 0xffffffu));
-                box = glintJoin(box, boxes[s]);
-            }
             glintStoreNode(build.hierarchy + 4u * node,
-                           glintEncode(grid, boxes, count, leaves, (header.x >> 8) + leaves & 0xffffffu, first_record));
+                           glintEncode(grid, count, leaves, (header.x >> 8) + leaves & 0xffffffu, header.y >> 8));
             const uint parent = scratch[glintNodeWord(node) + GLINT_NODE_PARENT];
             if (parent == 0u) break;
+            GlintBox box = GLINT_EMPTY;
+            for (uint s = 0u; s < count; s++) box = glintJoin(box, glintNodeChild(s));
             glintSetScratchBox(glintNodeWord(node), box);
             memoryBarrierBuffer();
             header = GLINT_TRACING_LOAD(build.hierarchy + 4u * parent).zw;

@@ -334,6 +334,42 @@ TEST_F(DeviceBuild, HoldsBoxesOfEverySize) {
     }
 }
 
+TEST_F(DeviceBuild, KeepsToTheLevelsOfTheStack) {
+    // A chain of 24 binary nodes, each with a sibling of 16 boxes. Those are large, and the larger the higher they are,
+    // so that by cost a node opens the sibling and leaves the chain, one level of it at a time. The cells of the curve
+    // are of size 1.
+    Random random(14);
+    std::vector<float> boxes;
+    const auto add = [&](const Vector3d& center, double size) {
+        for (const double side : {-0.5, 0.5}) {
+            for (int axis = 0; axis < 3; axis++) boxes.push_back(static_cast<float>(center[axis] + side * size));
+        }
+    };
+    add(Vector3d(0.5), 1.0);
+    add(Vector3d(1023.5), 1.0);
+    double size = 500.0;
+    for (int bit = 7; bit >= 0; bit--) {
+        for (int axis = 0; axis < 3; axis++) {
+            size *= 0.9;
+            for (uint32_t i = 0; i < 16; i++) {
+                Vector3d center(256.5);
+                for (int other = 0; other < 3; other++) {
+                    const uint64_t cells = other > axis ? 2u << bit : 1u << bit;
+                    center[other] += static_cast<double>(random.below(cells)) + (other == axis ? 1 << bit : 0);
+                }
+                add(center, size);
+            }
+        }
+    }
+    DeviceGeometry geometry;
+    geometry.primitives = static_cast<uint32_t>(boxes.size() / 6);
+    geometry.stride = 24;
+    const GeometryBuffers buffers = {storage(boxes), {}};
+    // `build` walks through all nodes and expects that no record is missing.
+    const Hierarchy hierarchy = build({Hierarchy::Kind::Boxes, {geometry}}, std::span(&buffers, 1));
+    EXPECT_EQ(hierarchy.records, geometry.primitives);
+}
+
 TEST_F(DeviceBuild, LeavesOutWhatTheHostLeavesOut) {
     constexpr float infinity = std::numeric_limits<float>::infinity();
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
@@ -352,6 +388,18 @@ TEST_F(DeviceBuild, LeavesOutWhatTheHostLeavesOut) {
     EXPECT_EQ(build(wrong).records, 298u);
     for (Vector3f& p : mesh.positions) p.x = nan;
     EXPECT_EQ(build(mesh).records, 0u);
+    // One that is left out must not take another one's place.
+    Mesh copies = soup(1, 1);
+    for (uint32_t i = 0; i < 30; i++) copies.indices.insert(copies.indices.end(), {0, 1, 2});
+    copies.positions.push_back(Vector3f(nan));
+    copies.indices[0] = 3;
+    const Hierarchy without = build(copies);
+    EXPECT_EQ(without.records, 30u);
+    for (uint32_t i = 0; i < without.records; i++) {
+        Record record;
+        std::memcpy(&record, &without.texels[without.firstRecord() + 3 * size_t(i)], sizeof(record));
+        EXPECT_TRUE(allInRange(record.values, 9)) << i;
+    }
     std::vector<float> boxes;
     for (uint32_t i = 0; i < 20; i++) {
         const float x = static_cast<float>(i);

@@ -31,6 +31,7 @@ uvec3 glintAbove(GlintGrid grid, vec3 v) {
 
 struct GlintNodeTexels {
     uvec4 texels[4];
+    GlintBox box;  // of all children
 };
 
 // The box of a child of the node to encode; an empty one becomes a point of the node. Whoever includes this defines it.
@@ -39,19 +40,16 @@ GlintBox glintNodeChild(uint s);
 // `count` children, the leaves first. All three axes at once, and boxes are read twice: arrays of them would take longer
 // to compile and to run.
 GlintNodeTexels glintEncode(GlintGrid grid, uint count, uint leaves, uint first_node, uint first_record) {
-    uvec3 all_low = uvec3(0xffffffffu);
-    uvec3 all_high = uvec3(0u);
-    for (uint s = 0u; s < count; s++) {
-        const GlintBox box = glintNodeChild(s);
-        if (glintIsEmpty(box)) continue;
-        all_low = min(all_low, glintBelow(grid, box.low));
-        all_high = max(all_high, glintAbove(grid, box.high));
-    }
+    GlintNodeTexels node;
+    node.box = GLINT_EMPTY;
+    for (uint s = 0u; s < count; s++) node.box = glintJoin(node.box, glintNodeChild(s));
     uvec3 origin = uvec3(0u);
     uvec3 exponent = uvec3(0u);
     uvec3 planes[4];  // of the children 0-3 and 4-7: low ones, high ones
     for (uint i = 0u; i < 4u; i++) planes[i] = uvec3(0u);
-    if (all_low.x <= all_high.x) {
+    if (!glintIsEmpty(node.box)) {
+        const uvec3 all_low = glintBelow(grid, node.box.low);
+        const uvec3 all_high = glintAbove(grid, node.box.high);
         // The smallest scale whose 255th plane, counted from a step that is one scale below everything, is not below
         // anything. With the highest bit of the extent, m, 254 scales of 2^(m - 7) may just not do; twice that does.
         exponent = uvec3(max(findMSB(all_high - all_low) - 15, ivec3(0)));
@@ -88,7 +86,6 @@ GlintNodeTexels glintEncode(GlintGrid grid, uint count, uint leaves, uint first_
             }
         }
     }
-    GlintNodeTexels node;
     node.texels[0] = uvec4(origin.x | exponent.x << 20 | (origin.z & 255u) << 24,
                            origin.y | exponent.y << 20 | (origin.z >> 8 & 255u) << 24,
                            leaves | count << 4 | (first_node - leaves) << 8,

@@ -76,13 +76,12 @@ void main() {
         for (;;) {
             const uint leaves = header.x & 15u;
             const uint count = header.x >> 4 & 15u;
-            glintStoreNode(build.hierarchy + 4u * node,
-                           glintEncode(grid, count, leaves, (header.x >> 8) + leaves & 0xffffffu, header.y >> 8));
+            const GlintNodeTexels encoded =
+                glintEncode(grid, count, leaves, (header.x >> 8) + leaves & 0xffffffu, header.y >> 8);
+            glintStoreNode(build.hierarchy + 4u * node, encoded);
             const uint parent = scratch[glintNodeWord(node) + GLINT_NODE_PARENT];
             if (parent == 0u) break;
-            GlintBox box = GLINT_EMPTY;
-            for (uint s = 0u; s < count; s++) box = glintJoin(box, glintNodeChild(s));
-            glintSetScratchBox(glintNodeWord(node), box);
+            glintSetScratchBox(glintNodeWord(node), encoded.box);
             memoryBarrierBuffer();
             header = GLINT_TRACING_LOAD(build.hierarchy + 4u * parent).zw;
             const uint done = atomicAdd(scratch[glintNodeWord(parent) + GLINT_NODE_DONE], 1u) + 1u;

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <ctime>
 
 namespace glint::bench {
 
@@ -19,47 +20,79 @@ using detail::Hierarchy;
 
 constexpr uint32_t rounds = 5;
 
-/// Millions of triangles a second.
-struct Rates {
-    Times build;
-    Times refit;
+/// Wall clock, and seconds of all the process' threads on two processors: what lavapipe and the host's builders take
+/// where nothing else runs.
+struct Clocks {
+    Times wall;
+    Times process;
+
+    template <class Work>
+    void take(const Work& work, bool counts) {
+        const double wall_begin = wallSeconds();
+        const std::clock_t process_begin = std::clock();
+        work();
+        if (!counts) return;
+        wall.values.push_back(wallSeconds() - wall_begin);
+        process.values.push_back(0.5 * static_cast<double>(std::clock() - process_begin) / CLOCKS_PER_SEC);
+    }
+    void print(std::string_view label, double millions) const {
+        fmt::print("    {:<14} {:6.2f} ({:6.2f} by processor time)\n", label, millions / wall.minimum(),
+                   millions / process.minimum());
+    }
 };
 
-/// Builds and refits on the device, and returns the hierarchy.
-Hierarchy buildOnDevice(Device device, const Mesh& mesh, Rates& rates) {
-    const detail::DeviceInput input = {detail::Hierarchy::Kind::Triangles, {test::deviceGeometryOf(mesh)}};
-    const detail::DeviceSizes sizes = *check(detail::deviceSizes(input));
-    test::DeviceBuilder builder(device);
-    const test::GeometryBuffers buffers = {builder.createStorage(std::as_bytes(std::span(mesh.positions))),
-                                           builder.createStorage(std::as_bytes(std::span(mesh.indices)))};
-    const Buffer heap = builder.createHeap(sizes.texels);
-    const uint32_t alignment = device.getFeatures().storageAlignment;
-    const detail::BuildPlan build = *check(detail::planBuild(input, 0, alignment));
-    const detail::BuildPlan refit = *check(detail::planRefit(input, sizes.nodes, 0, alignment));
-    const Buffer scratch = device.createBuffer(Buffer::FlagStorage, std::max(build.scratch, refit.scratch));
+void play(Device device, Compute compute) {
+    check(device.submit(compute));
     check(device.finish());
-    for (uint32_t round = 0; round <= rounds; round++) {
-        for (const auto& [plan, times] : {std::pair{&build, &rates.build}, std::pair{&refit, &rates.refit}}) {
-            Compute compute = device.createCompute();
-            builder.record(compute, *plan, heap, scratch, std::span(&buffers, 1));
-            const double begin = wallSeconds();
-            check(device.submit(compute));
-            check(device.finish());
-            // The driver compiles at the first dispatch, which does not count.
-            if (round > 0) times->values.push_back(wallSeconds() - begin);
-        }
-    }
-    Hierarchy hierarchy = builder.read(heap, 0);
-    const auto triangles = static_cast<double>(mesh.triangleCount());
-    fmt::print(
-        "  on the device: {:.1f} bytes a triangle, {} nodes, {:.2f} children each; {:.1f} bytes of scratch memory\n",
-        double(hierarchy.bytes()) / triangles, hierarchy.nodes,
-        double(hierarchy.nodes - 1 + hierarchy.records) / hierarchy.nodes, double(build.scratch) / triangles);
-    return hierarchy;
 }
 
-/// Rounds of rays through several hierarchies in turns; seconds of each.
-std::vector<Times> race(Device device, std::span<const Hierarchy* const> hierarchies, std::span<const Ray> rays) {
+/// Builds and refits on the device and on the host, in turns.
+struct Builders {
+    Clocks device_build;
+    Clocks device_refit;
+    Clocks host_build;
+    Clocks host_refit;
+
+    Hierarchy ours;
+    Hierarchy fast;
+
+    Builders(Device device, const Mesh& mesh) {
+        const detail::DeviceInput input = {Hierarchy::Kind::Triangles, {test::deviceGeometryOf(mesh)}};
+        const detail::DeviceSizes sizes = *check(detail::deviceSizes(input));
+        test::DeviceBuilder builder(device);
+        const test::GeometryBuffers buffers = {builder.createStorage(std::as_bytes(std::span(mesh.positions))),
+                                               builder.createStorage(std::as_bytes(std::span(mesh.indices)))};
+        const Buffer heap = builder.createHeap(sizes.texels);
+        const uint32_t alignment = device.getFeatures().storageAlignment;
+        const detail::BuildPlan build = *check(detail::planBuild(input, 0, alignment));
+        const detail::BuildPlan refit = *check(detail::planRefit(input, sizes.nodes, 0, alignment));
+        const Buffer scratch = device.createBuffer(Buffer::FlagStorage, std::max(build.scratch, refit.scratch));
+        const detail::TriangleGeometry geometry = test::geometryOf(mesh);
+        check(device.finish());
+        for (uint32_t round = 0; round <= rounds; round++) {
+            // The driver compiles at the first dispatch, which does not count.
+            const bool counts = round > 0;
+            for (const auto& [plan, clocks] : {std::pair{&build, &device_build}, std::pair{&refit, &device_refit}}) {
+                Compute compute = device.createCompute();
+                builder.record(compute, *plan, heap, scratch, std::span(&buffers, 1));
+                clocks->take([&] { play(device, std::move(compute)); }, counts);
+            }
+            host_build.take([&] { fast = test::hierarchyOf(mesh, BuildMode::Fast, &ThreadPool::shared()); }, counts);
+            host_refit.take(
+                [&] { check(detail::refitHierarchy(fast, std::span(&geometry, 1), &ThreadPool::shared())); }, counts);
+        }
+        ours = builder.read(heap, 0);
+        const auto triangles = static_cast<double>(mesh.triangleCount());
+        fmt::print(
+            "    {:.1f} bytes a triangle, {} nodes, {:.2f} children each; {:.0f} bytes of scratch memory, {:.0f} "
+            "for refitting\n",
+            double(ours.bytes()) / triangles, ours.nodes, double(ours.nodes - 1 + ours.records) / ours.nodes,
+            double(build.scratch) / triangles, double(refit.scratch) / triangles);
+    }
+};
+
+/// Rounds of rays through several hierarchies in turns.
+std::vector<Clocks> race(Device device, std::span<const Hierarchy* const> hierarchies, std::span<const Ray> rays) {
     Kernel kernel = device.createKernel();
     kernel.createShaderGLSL("#include <glint/tracing/batch.h>\n", "GLINT_TRACING_MEMORY=0");
     check(kernel.create());
@@ -68,7 +101,7 @@ std::vector<Times> race(Device device, std::span<const Hierarchy* const> hierarc
     std::vector<Buffer> buffers;
     for (const Hierarchy* each : hierarchies)
         buffers.push_back(device.createBuffer(Buffer::FlagTexel, each->texels.data(), each->bytes()));
-    std::vector<Times> times(hierarchies.size());
+    std::vector<Clocks> clocks(hierarchies.size());
     for (uint32_t round = 0; round <= rounds; round++) {
         for (size_t i = 0; i < buffers.size(); i++) {
             Compute compute = device.createCompute();
@@ -77,48 +110,39 @@ std::vector<Times> race(Device device, std::span<const Hierarchy* const> hierarc
             compute.setTexelBuffer(0, buffers[i], FormatRGBAu32);
             compute.setStorageBuffers(0, {ray_buffer, hits});
             compute.dispatch(rays.size());
-            const double begin = wallSeconds();
-            check(device.submit(compute));
-            check(device.finish());
-            if (round > 0) times[i].values.push_back(wallSeconds() - begin);
+            clocks[i].take([&] { play(device, std::move(compute)); }, round > 0);
         }
     }
-    return times;
+    return clocks;
 }
 
 void run(Report& report) {
     const Device device = createDevice();
-    ThreadPool& pool = ThreadPool::shared();
     for (const char* name : {"bunny", "100k", "1m"}) {
         const TracingScene scene = makeTracingScene(name);
         const double million = static_cast<double>(scene.mesh.triangleCount()) * 1e-6;
-        fmt::print("  {}\n", name);
-        Rates rates;
-        const Hierarchy ours = buildOnDevice(device, scene.mesh, rates);
-        printTimes("build", rates.build);
-        printTimes("refit", rates.refit);
-        report.add(fmt::format("tracing.build.device.{}", name), million / rates.build.minimum(),
+        fmt::print("  {}: million triangles a second\n", name);
+        const Builders builders(device, scene.mesh);
+        builders.device_build.print("device build", million);
+        builders.device_refit.print("device refit", million);
+        builders.host_build.print("host build", million);
+        builders.host_refit.print("host refit", million);
+        report.add(fmt::format("tracing.build.device.{}", name), million / builders.device_build.wall.minimum(),
                    "million triangles a second", "nothing", deviceName(device));
-        report.add(fmt::format("tracing.refit.device.{}", name), million / rates.refit.minimum(),
+        report.add(fmt::format("tracing.refit.device.{}", name), million / builders.device_refit.wall.minimum(),
                    "million triangles a second", "nothing", deviceName(device));
-        double begin = wallSeconds();
-        Hierarchy fast = test::hierarchyOf(scene.mesh, BuildMode::Fast, &pool);
-        const double fast_time = wallSeconds() - begin;
-        const detail::TriangleGeometry geometry = test::geometryOf(scene.mesh);
-        begin = wallSeconds();
-        check(detail::refitHierarchy(fast, std::span(&geometry, 1), &pool));
-        fmt::print("  million triangles a second: device {:.2f}, refit {:.2f}; host {:.2f}, refit {:.2f}\n",
-                   million / rates.build.minimum(), million / rates.refit.minimum(), million / fast_time,
-                   million / (wallSeconds() - begin));
-        const Hierarchy quality = test::hierarchyOf(scene.mesh, BuildMode::Quality, &pool);
+        const Hierarchy quality = test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
         for (const auto& [kind, rays] : {std::pair{"camera", &scene.camera}, std::pair{"bounce", &scene.bounce}}) {
-            const Hierarchy* const all[] = {&quality, &fast, &ours};
-            const std::vector<Times> times = race(device, all, *rays);
+            const Hierarchy* const all[] = {&quality, &builders.fast, &builders.ours};
+            const std::vector<Clocks> clocks = race(device, all, *rays);
             const double millions = static_cast<double>(rays->size()) * 1e-6;
-            fmt::print("  {}, million rays a second: quality {:.2f}, fast {:.2f}, device {:.2f}\n", kind,
-                       millions / times[0].minimum(), millions / times[1].minimum(), millions / times[2].minimum());
-            report.add(fmt::format("tracing.device.{}.{}", name, kind), times[0].minimum() / times[2].minimum(),
-                       "ratio", "rays through the host's quality hierarchy", deviceName(device));
+            fmt::print("  {} {}: million rays a second\n", name, kind);
+            clocks[0].print("host, quality", millions);
+            clocks[1].print("host, fast", millions);
+            clocks[2].print("device", millions);
+            report.add(fmt::format("tracing.device.{}.{}", name, kind),
+                       clocks[0].wall.minimum() / clocks[2].wall.minimum(), "ratio",
+                       "rays through the host's quality hierarchy", deviceName(device));
         }
     }
 }

@@ -131,15 +131,12 @@ public:
         tree_.nodes = Array<BinaryNode>(count - 1);
         tree_.heights = Array<uint8_t>(count - 1);
         tree_.costs = Array<CollapseCost>(count - 1);
-        tree_.build_bytes = count * (sizeof(PrimRef) + sizeof(BinaryNode) + sizeof(CollapseCost) + 1);
         Range all = {0, count, 0, {}};
         if (mode_ == BuildMode::Quality) { all.centers = centers(all); }
         // The top is split with all threads at each node, then each thread takes subtrees.
         task_size_ = std::max<uint32_t>(grain, count / 64);
-        if (mode_ == BuildMode::Quality && count > task_size_) {
-            scratch_ = Array<PrimRef>(count);
-            tree_.build_bytes += count * sizeof(PrimRef);
-        }
+        if (mode_ == BuildMode::Quality && count > task_size_) scratch_ = Array<PrimRef>(count);
+        tree_.build_bytes = tree_.bytes() + codes.size() * sizeof(uint32_t) + scratch_.size() * sizeof(PrimRef);
         const BinaryChild root = top(all);
         scratch_ = {};
         task_roots_.resize(tasks_.size());
@@ -369,13 +366,12 @@ BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mo
     tree.area_scale = Float4::all(extent > 1e-30f ? (extent < 1e38f ? 1.0f / extent : 1e-38f) : 1e30f);
     if (tree.refs.size() == 1) {
         tree.root = {BinaryChild::leaf_bit};
-        tree.build_bytes = sizeof(PrimRef);
+        tree.build_bytes = tree.bytes();
         return tree;
     }
     Builder builder(tree, mode, pool);
     if (mode == BuildMode::Fast) builder.codes = sortByCode(tree.refs, bounds, pool);
     builder.run();
-    if (mode == BuildMode::Fast) tree.build_bytes += tree.refs.size() * (sizeof(PrimRef) + 8);
     return tree;
 }
 

@@ -105,7 +105,9 @@ Expected<Hierarchy> build(std::span<const typename Reader::Geometry> geometries,
         parallelRanges(pool, order.size(), grain, [&](size_t begin, size_t end) {
             for (size_t i = begin; i < end; i++) order[i] = tree.refs[wide.order[i]].id();
         });
-        result.build_bytes = tree.build_bytes + 2 * wide.nodes.size() * sizeof(Node) + 12 * order.size();
+        // While the wide nodes are made, each subtree's are copied to their places.
+        result.build_bytes =
+            std::max(tree.build_bytes, tree.bytes() + 2 * wide.nodes.size() * sizeof(Node) + 12 * order.size());
     }
 
     result.nodes = static_cast<uint32_t>(wide.nodes.size());

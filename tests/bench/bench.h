@@ -36,6 +36,11 @@ public:
     explicit Report(const Options& options) : options_(options) {}
 
     const Options& options() const { return options_; }
+    /// False if the program was asked for figures of tracing that begin otherwise.
+    bool wants(std::string_view prefix) const {
+        const std::string_view filter = options_.filter;
+        return !filter.starts_with("tracing.") || prefix.starts_with(filter) || filter.starts_with(prefix);
+    }
     /// `command` is the benchmark that makes the figure again.
     void add(std::string name, double value, std::string unit, std::string against, std::string device);
     /// Where `./dev report` finds tables and curves; made if absent.
@@ -64,6 +69,7 @@ Benchmark memoryBenchmark();
 Benchmark tracingSoftwareBenchmark();
 Benchmark tracingBuildBenchmark();
 Benchmark tracingDeviceBenchmark();
+Benchmark tracingDriverBenchmark();
 Benchmark castBenchmark();
 Benchmark castMemoryBenchmark();
 Benchmark tracingLeaksBenchmark();

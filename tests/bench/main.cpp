@@ -53,8 +53,8 @@ int main(int argc, char** argv) {
     const Benchmark benchmarks[] = {shaderCompileBenchmark(), dispatchBenchmark(),        drawBenchmark(),
                                     warmFrameBenchmark(),     tracingFrameBenchmark(),    startupBenchmark(),
                                     memoryBenchmark(),        tracingSoftwareBenchmark(), tracingBuildBenchmark(),
-                                    tracingDeviceBenchmark(), tracingLeaksBenchmark(),    castBenchmark(),
-                                    castMemoryBenchmark()};
+                                    tracingDeviceBenchmark(), tracingLeaksBenchmark(),    tracingDriverBenchmark(),
+                                    castBenchmark(),          castMemoryBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

@@ -1,10 +1,13 @@
 // tracing.{bunny,100k,1m}.{camera,bounce}.software_over_embree1: rays a second of Glint's own engine over those of
-// Embree's rtcIntersect1 on two threads, in turns in one run. tracing.build.{quality,fast,refit}: millions of triangles
-// a second of the builders, on the 1m mesh. tracing.leaks.software: rays at edges that slip through.
+// Embree's rtcIntersect1 on two threads, in turns in one run; tracing.instances.software_over_embree1, of camera rays,
+// and tracing.instances.bounce. query_over_embree1: of queries, as rewritten shaders have them, of a top level with one
+// instance in the first three scenes. tracing.build.{quality,fast,refit}: millions of triangles a second of the
+// builders, on the 1m mesh. tracing.leaks.software: rays at edges that slip through.
 
 #include "accuracy/embree.h"
-#include "bench/tracing_pipeline.h"
+#include "bench/tracing_batch.h"
 #include "bench/tracing_scenes.h"
+#include "support/allocations.h"
 #include "support/hierarchies.h"
 #include "support/reference.h"
 
@@ -12,6 +15,7 @@
 #include <glint/tracing/detail/hierarchy.h>
 
 #include <fmt/format.h>
+#include <malloc.h>
 
 #include <array>
 #include <cmath>
@@ -25,44 +29,6 @@ using detail::BuildMode;
 using detail::Hierarchy;
 
 constexpr uint32_t rounds = 9;
-
-/// A kernel over one set of rays.
-class Batch {
-public:
-    Batch(const Device& device, const Kernel& kernel, const Buffer& hierarchy, std::span<const Ray> rays)
-        : device_(device),
-          kernel_(kernel),
-          hierarchy_(hierarchy),
-          count_(static_cast<uint32_t>(rays.size())),
-          rays_(device_.createBuffer(Buffer::FlagStorage, rays)),
-          hits_(device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit))) {}
-
-    void trace(uint32_t threads) {
-        Compute compute = device_.createCompute();
-        compute.setKernel(kernel_);
-        compute.setUniform(0, std::array<uint32_t, 4>{count_, 0, 0, 0});
-        compute.setTexelBuffer(0, hierarchy_, FormatRGBAu32);
-        compute.setStorageBuffers(0, {rays_, hits_});
-        compute.dispatch(threads);
-        check(device_.submit(compute));
-        check(device_.finish());
-    }
-
-    std::vector<RayHit> hits() {
-        const auto all = *check(device_.read<BatchHit>(hits_));
-        std::vector<RayHit> hits(all.size());
-        std::transform(all.begin(), all.end(), hits.begin(), [](const BatchHit& each) { return each.hit; });
-        return hits;
-    }
-
-private:
-    Device device_;
-    Kernel kernel_;
-    Buffer hierarchy_;
-    uint32_t count_;
-    Buffer rays_;
-    Buffer hits_;
-};
 
 /// Differences to Embree's robust answers.
 struct Differences {
@@ -93,58 +59,58 @@ Differences compare(std::span<const RayHit> ours, std::span<const RayHit> theirs
 
 struct Variant {
     std::string name;
+    const char* kernel;
     std::string macros;
+    bool has_instances = false;
     uint32_t rays_per_thread = 1;
 };
 
-Kernel createKernel(const Device& device, const Variant& variant) {
-    Device maker = device;
-    Kernel kernel = maker.createKernel();
-    kernel.createShaderGLSL("#include <glint/tracing/batch.h>\n", "GLINT_TRACING_MEMORY=0;" + variant.macros);
-    check(kernel.create());
-    return kernel;
-}
+const Variant mesh_variants[] = {
+    {"one ray a lane", batch_kernel, ""},
+    {"query", query_kernel, "DRIVER=0", true},
+    {"refilling", batch_kernel, "GLINT_TRACING_REFILL=1;GLINT_TRACING_RAYS=16", false, 16},
+};
+const Variant instance_variants[] = {
+    {"one ray a lane", batch_kernel, "GLINT_TRACING_LEVELS=2", true},
+    {"query", query_kernel, "DRIVER=0", true},
+};
 
-/// Seconds of all the process' threads on processors. Both sides keep two threads busy, so half of it is the time that
-/// they take where nothing else runs.
-double processSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+/// What the kernels read: the mesh's hierarchy, and the same below a top level, of one instance if the scene has none.
+struct Structures {
+    Buffer mesh;
+    Buffer instances;
 
-struct RaceTimes {
-    Times wall;
-    Times process;
-
-    template <class Work>
-    void take(const Work& work, bool counts) {
-        const double wall_begin = wallSeconds();
-        const double process_begin = processSeconds();
-        work();
-        if (!counts) return;
-        wall.values.push_back(wallSeconds() - wall_begin);
-        process.values.push_back(0.5 * (processSeconds() - process_begin));
+    Structures(const Device& device, const TracingScene& scene) {
+        const Hierarchy hierarchy = test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
+        std::vector<Transform3x4> transforms = scene.instances;
+        if (transforms.empty()) transforms.resize(1);
+        const std::vector<detail::Texel> texels = test::instancesOf(hierarchy, transforms, &ThreadPool::shared());
+        Device owner = device;
+        mesh = owner.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
+        instances = owner.createBuffer(Buffer::FlagTexel, std::span(texels));
     }
 };
 
 /// Traces one set of rays by all variants and by Embree in turns. Returns their times: Embree first.
-std::vector<RaceTimes> race(const Device& device, const Buffer& hierarchy, const TracingScene& scene, const char* kind,
-                            std::span<const Ray> rays, std::span<const Variant> variants, uint32_t turns) {
-    std::vector<Kernel> kernels;
-    std::vector<std::unique_ptr<Batch>> batches;
+std::vector<RaceTimes> race(const Device& device, const Structures& structures, const TracingScene& scene,
+                            const char* kind, std::span<const Ray> rays, std::span<const Variant> variants) {
+    std::vector<RayBatch> batches;
     for (const Variant& variant : variants) {
-        kernels.push_back(createKernel(device, variant));
-        batches.push_back(std::make_unique<Batch>(device, kernels.back(), hierarchy, rays));
+        const Kernel kernel = createRayKernel(device, variant.kernel, variant.macros);
+        batches.emplace_back(device, kernel, variant.has_instances ? structures.instances : structures.mesh, rays);
     }
     std::vector<RayHit> reference(rays.size());
-    test::EmbreeScene(scene.mesh, test::EmbreeMode::Robust).cast(rays, reference, 2);
-    const test::EmbreeScene embree(scene.mesh, test::EmbreeMode::Fast);
+    test::EmbreeScene(scene.mesh, test::EmbreeMode::Robust, scene.instances).cast(rays, reference, 2);
+    const test::EmbreeScene embree(scene.mesh, test::EmbreeMode::Fast, scene.instances);
     std::vector<RayHit> hits(rays.size());
     std::vector<RaceTimes> times(variants.size() + 1);
-    for (uint32_t turn = 0; turn <= turns; turn++) {
+    for (uint32_t turn = 0; turn <= rounds; turn++) {
         // The driver compiles at the first dispatch, which does not count.
         times[0].take([&] { embree.cast(rays, hits, 2); }, turn > 0);
         for (size_t i = 0; i < variants.size(); i++) {
             const auto count = static_cast<uint32_t>(rays.size());
             const uint32_t threads = (count + variants[i].rays_per_thread - 1) / variants[i].rays_per_thread;
-            times[i + 1].take([&] { batches[i]->trace(threads); }, turn > 0);
+            times[i + 1].take([&] { batches[i].trace(threads); }, turn > 0);
         }
     }
     const double million = static_cast<double>(rays.size()) * 1e-6;
@@ -156,28 +122,37 @@ std::vector<RaceTimes> race(const Device& device, const Buffer& hierarchy, const
         fmt::print("   over Embree {:.3f} ({:.3f}) {:.3f}\n", times[0].wall.minimum() / each.wall.minimum(),
                    times[0].wall.median() / each.wall.median(), times[0].process.minimum() / each.process.minimum());
     }
-    for (size_t i = 0; i < variants.size(); i++)
-        compare(batches[i]->hits(), reference).print("    " + variants[i].name);
+    for (size_t i = 0; i < variants.size(); i++) compare(batches[i].hits(), reference).print("    " + variants[i].name);
     std::fflush(stdout);
     return times;
 }
 
+constexpr const char* tracing_scenes[] = {"bunny", "100k", "1m", "instances"};
+
+/// "tracing.100k.bounce.query_over_embree1"
+std::string figureName(const std::string& scene, const std::string& kind, const char* what) {
+    const bool is_plain = scene == "instances" && kind == "camera";
+    return fmt::format("tracing.{}.{}{}_over_embree1", scene, is_plain ? "" : kind + ".", what);
+}
+
 void runTracing(Report& report) {
     const Device device = createDevice();
-    const Variant variants[] = {{"one ray a lane", "GLINT_TRACING_REFILL=0"},
-                                {"refilling", "GLINT_TRACING_REFILL=1;GLINT_TRACING_RAYS=16", 16}};
-    for (const char* name : {"bunny", "100k", "1m"}) {
+    for (const char* name : tracing_scenes) {
+        if (!report.wants(fmt::format("tracing.{}.", name))) continue;
         const TracingScene scene = makeTracingScene(name);
-        const Hierarchy hierarchy = test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
-        Device owner = device;
-        const Buffer buffer = owner.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
-        const auto camera = race(device, buffer, scene, "camera", scene.camera, variants, rounds);
-        const auto bounce = race(device, buffer, scene, "bounce", scene.bounce, variants, rounds);
-        const std::string figure = fmt::format("tracing.{}.", name);
-        report.add(figure + "camera.software_over_embree1", camera[0].wall.minimum() / camera[1].wall.minimum(),
-                   "ratio", "Embree's rtcIntersect1 on two threads", deviceName(device));
-        report.add(figure + "bounce.software_over_embree1", bounce[0].wall.minimum() / bounce[1].wall.minimum(),
-                   "ratio", "Embree's rtcIntersect1 on two threads", deviceName(device));
+        const Structures structures(device, scene);
+        for (const char* kind : {"camera", "bounce"}) {
+            const auto& rays = std::string_view(kind) == "camera" ? scene.camera : scene.bounce;
+            const std::span<const Variant> variants =
+                scene.instances.empty() ? std::span<const Variant>(mesh_variants) : instance_variants;
+            const std::vector<RaceTimes> times = race(device, structures, scene, kind, rays, variants);
+            const auto add = [&](const char* what, size_t variant) {
+                report.add(figureName(name, kind, what), times[0].wall.minimum() / times[variant].wall.minimum(),
+                           "ratio", "Embree's rtcIntersect1 on two threads", deviceName(device));
+            };
+            add("software", 1);
+            add("query", 2);
+        }
     }
 }
 
@@ -206,7 +181,7 @@ void runLeaks(Report& report) {
     const Hierarchy hierarchy = test::hierarchyOf(mesh, BuildMode::Quality, &ThreadPool::shared());
     Device owner = device;
     const Buffer buffer = owner.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
-    const Kernel kernel = createKernel(device, {"coherent", ""});
+    const Kernel kernel = createRayKernel(device, batch_kernel, "");
     uint64_t leaks = 0;
     uint64_t embree_leaks = 0;
     uint64_t robust_leaks = 0;
@@ -218,7 +193,7 @@ void runLeaks(Report& report) {
     };
     for (uint32_t i = 0; i < batches; i++) {
         const std::vector<Ray> rays = raysAtEdges(mesh, 1u << 20, 100 + i);
-        Batch batch(device, kernel, buffer, rays);
+        RayBatch batch(device, kernel, buffer, rays);
         batch.trace(static_cast<uint32_t>(rays.size()));
         leaks += count(batch.hits());
         if (i != 0) continue;
@@ -240,52 +215,61 @@ void runBuilds(Report& report) {
     const detail::TriangleGeometry geometry = test::geometryOf(scene.mesh);
     const double million = static_cast<double>(geometry.triangles) * 1e-6;
     ThreadPool& pool = ThreadPool::shared();
-    Times quality;
-    Times fast;
-    Times refit;
+    RaceTimes quality;
+    RaceTimes fast;
+    RaceTimes refit;
     for (uint32_t round = 0; round < 5; round++) {
-        double begin = wallSeconds();
-        const Hierarchy slow = test::hierarchyOf(scene.mesh, BuildMode::Quality, &pool);
-        quality.values.push_back(wallSeconds() - begin);
-        begin = wallSeconds();
-        Hierarchy quick = test::hierarchyOf(scene.mesh, BuildMode::Fast, &pool);
-        fast.values.push_back(wallSeconds() - begin);
-        begin = wallSeconds();
-        check(detail::refitHierarchy(quick, std::span(&geometry, 1), &pool));
-        refit.values.push_back(wallSeconds() - begin);
+        Hierarchy slow;
+        Hierarchy quick;
+        quality.take([&] { slow = test::hierarchyOf(scene.mesh, BuildMode::Quality, &pool); }, true);
+        fast.take([&] { quick = test::hierarchyOf(scene.mesh, BuildMode::Fast, &pool); }, true);
+        refit.take([&] { check(detail::refitHierarchy(quick, std::span(&geometry, 1), &pool)); }, true);
         if (round != 0) continue;
-        const Hierarchy& fast_built = quick;
-        for (const auto& [name, hierarchy] : {std::pair{"quality", &slow}, std::pair{"fast", &fast_built}}) {
-            fmt::print(
-                "  {}: {:.1f} bytes a triangle, {:.1f} at the peak of the build; {} nodes, {:.2f} children each, "
-                "{} levels\n",
-                name, double(hierarchy->bytes()) / geometry.triangles,
-                double(hierarchy->build_bytes) / geometry.triangles, hierarchy->nodes,
-                double(hierarchy->nodes - 1 + hierarchy->records) / hierarchy->nodes, hierarchy->depth);
+        for (const auto& [name, hierarchy] : {std::pair{"quality", &slow}, std::pair{"fast", &quick}}) {
+            fmt::print("  {}: {:.1f} bytes a triangle; {} nodes, {:.2f} children each, {} levels\n", name,
+                       double(hierarchy->bytes()) / geometry.triangles, hierarchy->nodes,
+                       double(hierarchy->nodes - 1 + hierarchy->records) / hierarchy->nodes, hierarchy->depth);
         }
     }
-    printTimes("quality", quality);
-    printTimes("fast", fast);
-    printTimes("refit", refit);
     const std::string machine = fmt::format("{}, {} threads", processorName(), pool.size());
-    report.add("tracing.build.quality", million / quality.minimum(), "million triangles a second", "nothing", machine);
-    report.add("tracing.build.fast", million / fast.minimum(), "million triangles a second", "nothing", machine);
-    report.add("tracing.build.refit", million / refit.minimum(), "million triangles a second", "nothing", machine);
+    // Large blocks go back to the system when they are freed, as at the start of a program; else glibc keeps more and
+    // more of them, and what is held says little about what is needed.
+    ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
+    for (const auto& [name, mode] : {std::pair{"quality", BuildMode::Quality}, std::pair{"fast", BuildMode::Fast}}) {
+        uint64_t stated = 0;
+        const uint64_t peak =
+            test::peakMemory([&] { stated = test::hierarchyOf(scene.mesh, mode, &pool).build_bytes; });
+        report.add(fmt::format("tracing.build.peak_bytes_per_triangle.{}", name),
+                   static_cast<double>(peak) / geometry.triangles, "bytes",
+                   fmt::format("{:.1f} as the builder counts", static_cast<double>(stated) / geometry.triangles),
+                   machine);
+    }
+    for (const auto& [name, times] :
+         {std::pair{"quality", &quality}, std::pair{"fast", &fast}, std::pair{"refit", &refit}}) {
+        fmt::print("  {}: by processor time {:.2f}\n", name, million / times->process.minimum());
+        report.add(fmt::format("tracing.build.{}", name), million / times->wall.minimum(), "million triangles a second",
+                   "nothing", machine);
+    }
 }
 
 }  // namespace
 
 Benchmark tracingSoftwareBenchmark() {
-    return {{"tracing.bunny.camera.software_over_embree1", "tracing.bunny.bounce.software_over_embree1",
-             "tracing.100k.camera.software_over_embree1", "tracing.100k.bounce.software_over_embree1",
-             "tracing.1m.camera.software_over_embree1", "tracing.1m.bounce.software_over_embree1"},
-            runTracing};
+    Benchmark benchmark = {{}, runTracing};
+    for (const char* scene : tracing_scenes) {
+        for (const char* kind : {"camera", "bounce"}) {
+            for (const char* what : {"software", "query"}) benchmark.figures.push_back(figureName(scene, kind, what));
+        }
+    }
+    return benchmark;
 }
 
 Benchmark tracingLeaksBenchmark() { return {{"tracing.leaks.software"}, runLeaks}; }
 
 Benchmark tracingBuildBenchmark() {
-    return {{"tracing.build.quality", "tracing.build.fast", "tracing.build.refit"}, runBuilds};
+    return {{"tracing.build.quality", "tracing.build.fast", "tracing.build.refit",
+             "tracing.build.peak_bytes_per_triangle.quality", "tracing.build.peak_bytes_per_triangle.fast"},
+            runBuilds};
 }
 
 }  // namespace glint::bench

@@ -64,8 +64,11 @@ struct BinaryTree {
     Array<CollapseCost> costs;
     BinaryChild root;                       ///< of one primitive at least
     Float4 area_scale = Float4::all(1.0f);  ///< for halfArea
-    uint64_t build_bytes = 0;
+    uint64_t build_bytes = 0;               ///< largest number of bytes held during the build, the result included
 
+    uint64_t bytes() const {
+        return refs.size() * sizeof(PrimRef) + nodes.size() * (sizeof(BinaryNode) + sizeof(CollapseCost) + 1);
+    }
     uint32_t height(BinaryChild child) const { return child.isLeaf() ? 0 : heights[child.index()]; }
     Box4 box(BinaryChild child) const {
         return child.isLeaf() ? refs[child.index()].box() : nodes[child.index()].box();

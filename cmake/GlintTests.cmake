@@ -37,3 +37,12 @@ function(glint_test name labels)
             LABELS "${labels};long" TIMEOUT 7200 ENVIRONMENT "${environment}")
     endif()
 endfunction()
+
+# glint_test_again(name variant filter environment): the test program once more, with these tests and variables.
+function(glint_test_again name variant filter environment)
+    add_test(NAME ${name}_${variant} COMMAND ${name} --gtest_brief=1 "--gtest_filter=${filter}")
+    get_test_property(${name} LABELS labels)
+    get_test_property(${name} ENVIRONMENT common)
+    set_tests_properties(${name}_${variant} PROPERTIES
+        LABELS "${labels}" TIMEOUT ${GLINT_TEST_TIMEOUT} ENVIRONMENT "${common};${environment}")
+endfunction()

@@ -1,8 +1,6 @@
 #include <glint/tracing/detail/device_build.h>
 
 #include <glint/base/format_error.h>
-#include <glint/tracing/detail/header.h>
-#include <glint/tracing/detail/instances.h>
 #include <glint/tracing/detail/primitives.h>
 
 #include <algorithm>

@@ -335,10 +335,9 @@ TEST_F(DeviceBuild, HoldsBoxesOfEverySize) {
 }
 
 TEST_F(DeviceBuild, KeepsToTheLevelsOfTheStack) {
-    // A chain of 24 binary nodes, each with a sibling of 16 boxes. Those are large, and the larger the higher they are,
-    // so that by cost a node opens the sibling and leaves the chain, one level of it at a time. The cells of the curve
-    // are of size 1.
-    Random random(14);
+    // A chain of binary nodes, each with a sibling of seven groups of eight boxes: given seven children of a node, such
+    // a sibling takes a node less. Boxes are larger the higher they are, so by cost one node takes but one step along
+    // the chain. The cells of the curve are of size 1.
     std::vector<float> boxes;
     const auto add = [&](const Vector3d& center, double size) {
         for (const double side : {-0.5, 0.5}) {
@@ -348,17 +347,15 @@ TEST_F(DeviceBuild, KeepsToTheLevelsOfTheStack) {
     add(Vector3d(0.5), 1.0);
     add(Vector3d(1023.5), 1.0);
     double size = 500.0;
-    for (int bit = 7; bit >= 0; bit--) {
-        for (int axis = 0; axis < 3; axis++) {
-            size *= 0.9;
-            for (uint32_t i = 0; i < 16; i++) {
-                Vector3d center(256.5);
-                for (int other = 0; other < 3; other++) {
-                    const uint64_t cells = other > axis ? 2u << bit : 1u << bit;
-                    center[other] += static_cast<double>(random.below(cells)) + (other == axis ? 1 << bit : 0);
-                }
-                add(center, size);
+    for (int step = 0; step < 18; step++) {
+        size *= 0.9;
+        for (int group = 0; group < 7; group++) {
+            Vector3d center(256.5);
+            // The code's bits from this step's on: x, y, z of bit 7, of bit 6 and so on.
+            for (int bit = 0; bit < 4; bit++) {
+                if (bit == 0 || (group >> (bit - 1) & 1) != 0) center[(step + bit) % 3] += 1 << (7 - (step + bit) / 3);
             }
+            for (int copy = 0; copy < 8; copy++) add(center, size);
         }
     }
     DeviceGeometry geometry;
@@ -391,10 +388,11 @@ TEST_F(DeviceBuild, LeavesOutWhatTheHostLeavesOut) {
     // One that is left out must not take another one's place.
     Mesh copies = soup(1, 1);
     for (uint32_t i = 0; i < 30; i++) copies.indices.insert(copies.indices.end(), {0, 1, 2});
-    copies.positions.push_back(Vector3f(nan));
-    copies.indices[0] = 3;
+    copies.indices.insert(copies.indices.end(), {4, 4, 4});
+    copies.indices.insert(copies.indices.begin() + 60, {3, 3, 3});
+    copies.positions.insert(copies.positions.end(), {Vector3f(nan), Vector3f(1e6f)});
     const Hierarchy without = build(copies);
-    EXPECT_EQ(without.records, 30u);
+    EXPECT_EQ(without.records, 32u);
     for (uint32_t i = 0; i < without.records; i++) {
         Record record;
         std::memcpy(&record, &without.texels[without.firstRecord() + 3 * size_t(i)], sizeof(record));

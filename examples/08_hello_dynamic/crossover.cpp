@@ -79,13 +79,21 @@ private:
 /// Times of two runs differ by so much for no reason.
 constexpr double noise = 0.05;
 
-/// Where refitting becomes dearer for good; NaN if it does not.
+/// From where on to rebuild: the plan of the least sum over all deformations, which a single odd time does not change.
+/// Between two of them the crossing is interpolated. NaN: never.
 double crossing(const std::vector<double>& amounts, const std::vector<Cost>& refit, const std::vector<Cost>& rebuild) {
     const auto loss = [&](size_t i) { return refit[i].sum() - (1.0 + noise) * rebuild[i].sum(); };
     size_t first = amounts.size();
-    while (first > 0 && loss(first - 1) > 0.0) first--;
+    double saved = 0.0, most_saved = 0.0;
+    for (size_t i = amounts.size(); i-- > 0;) {
+        saved += loss(i);
+        if (saved <= most_saved) continue;
+        most_saved = saved;
+        first = i;
+    }
     if (first == amounts.size()) return std::numeric_limits<double>::quiet_NaN();
     if (first == 0) return amounts[0];
+    // The plan is the best one: refitting is not dearer just before, and dearer here.
     const double share = loss(first - 1) / (loss(first - 1) - loss(first));
     return amounts[first - 1] + share * (amounts[first] - amounts[first - 1]);
 }

@@ -16,12 +16,12 @@
 
 namespace glint::bench {
 
-/// As the kernel writes it.
-struct TracedHit {
+/// A hit as the kernel of shaders/tracing/batch.h writes it.
+struct BatchHit {
     RayHit hit;
-    uint32_t instance;
-    uint32_t unused;
+    uint32_t unused = 0;
 };
+static_assert(sizeof(BatchHit) == 32);
 
 /// A kernel over one set of rays, whose slots are those of shaders/tracing/batch.h.
 class RayBatch {
@@ -34,7 +34,7 @@ public:
           structure_(structure),
           count_(static_cast<uint32_t>(rays.size())),
           rays_(device_.createBuffer(Buffer::FlagStorage, rays)),
-          hits_(device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(TracedHit))) {}
+          hits_(device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit))) {}
 
     uint32_t size() const { return count_; }
 
@@ -53,9 +53,9 @@ public:
     }
 
     std::vector<RayHit> hits() {
-        const auto all = *check(device_.read<TracedHit>(hits_));
+        const auto all = *check(device_.read<BatchHit>(hits_));
         std::vector<RayHit> hits(all.size());
-        std::transform(all.begin(), all.end(), hits.begin(), [](const TracedHit& each) { return each.hit; });
+        std::transform(all.begin(), all.end(), hits.begin(), [](const BatchHit& each) { return each.hit; });
         return hits;
     }
 

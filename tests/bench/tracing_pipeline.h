@@ -3,6 +3,7 @@
 // The driver's ray-tracing pipeline, by hand: what Glint's own engine is compared with where there are no ray queries.
 
 #include "bench/raw_vulkan.h"
+#include "bench/tracing_batch.h"
 
 #include <glint/format/mesh.h>
 #include <glint/graphics/ray_caster.h>
@@ -12,14 +13,6 @@
 #include <vector>
 
 namespace glint::bench {
-
-/// A hit as the kernel of shaders/tracing/batch.h writes it.
-struct BatchHit {
-    RayHit hit;
-    uint32_t instance = RayHit::none;
-    uint32_t unused = 0;
-};
-static_assert(sizeof(BatchHit) == 32);
 
 /// Instances of a mesh in structures that the driver builds for fast tracing, and a pipeline of three shaders (ray
 /// generation, miss, closest hit) that reads rays from a buffer and writes the records of hits. Opaque, no culling.

@@ -358,6 +358,7 @@ private:
 }  // namespace
 
 BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mode, ThreadPool* pool) {
+    if (mode == BuildMode::Split) mode = BuildMode::Quality;
     BinaryTree tree;
     tree.refs = std::move(refs);
     float size[4];

@@ -4,6 +4,7 @@
 #include <glint/tracing/detail/header.h>
 #include <glint/tracing/detail/parallel.h>
 #include <glint/tracing/detail/primitives.h>
+#include <glint/tracing/detail/splits.h>
 #include <glint/tracing/detail/wide_tree.h>
 
 #include <atomic>
@@ -89,8 +90,19 @@ Expected<Hierarchy> build(std::span<const typename Reader::Geometry> geometries,
 
     Hierarchy result;
     result.kind = Reader::kind;
-    result.records = gathered->active;
     result.inactive = static_cast<uint32_t>(first.back()) - gathered->active;
+    if (Reader::kind == Hierarchy::Kind::Triangles && mode == BuildMode::Split) {
+        gathered->refs = splitBoxes(
+            std::move(gathered->refs), gathered->bounds, max_primitives - gathered->active,
+            [&](uint32_t id, float values[9]) {
+                const size_t g = std::upper_bound(first.begin(), first.end(), id) - first.begin() - 1;
+                if (geometries[g].opaque) Reader::read(geometries[g], static_cast<uint32_t>(id - first[g]), values);
+                return geometries[g].opaque;
+            },
+            pool);
+        gathered->active = static_cast<uint32_t>(gathered->refs.size());
+    }
+    result.records = gathered->active;
     const Grid grid = makeGrid(gathered->bounds);
     WideTree wide;
     Array<uint32_t> order(gathered->active);

@@ -35,6 +35,86 @@ bool equal(const Hierarchy& a, const Hierarchy& b) {
 
 constexpr BuildMode both_modes[] = {BuildMode::Quality, BuildMode::Fast};
 
+/// Long thin triangles in all directions.
+Mesh needles(uint32_t count, uint64_t seed) {
+    test::Random random(seed);
+    Mesh mesh;
+    for (uint32_t i = 0; i < count; i++) {
+        const Vector3d a = random.direction();
+        const Vector3d along = random.direction();
+        mesh.positions.push_back(Vector3f(a - along));
+        mesh.positions.push_back(Vector3f(a + along));
+        mesh.positions.push_back(Vector3f(a + 0.01 * random.direction()));
+        for (uint32_t c = 0; c < 3; c++) mesh.indices.push_back(3 * i + c);
+    }
+    return mesh;
+}
+
+TEST(TracingHierarchy, SplitsHoldAllOfTheirTriangles) {
+    const Mesh mesh = needles(5000, 8);
+    const Hierarchy hierarchy = hierarchyOf(mesh, BuildMode::Split);
+    EXPECT_GT(hierarchy.records, 5500u);
+    EXPECT_LE(hierarchy.records, 8000u);
+    for (const uint32_t threads : {1u, 3u}) {
+        ThreadPool pool(threads);
+        EXPECT_TRUE(equal(hierarchy, hierarchyOf(mesh, BuildMode::Split, &pool))) << threads << " threads";
+    }
+
+    // Points of each triangle lie in one of its boxes.
+    const Header header = readHeader(hierarchy);
+    Grid grid;
+    std::copy_n(header.minimum, 3, grid.minimum);
+    grid.step = header.step;
+    struct Leaf {
+        double lo[3], hi[3];
+    };
+    std::vector<std::vector<Leaf>> leaves(5000);
+    for (uint32_t i = 1; i <= hierarchy.nodes; i++) {
+        Node node;
+        std::memcpy(&node, &hierarchy.texels[4 * size_t(i)], sizeof(node));
+        for (uint32_t s = 0; s < node.leaves(); s++) {
+            Record record;
+            std::memcpy(&record, &hierarchy.texels[hierarchy.firstRecord() + 3 * size_t(node.record() + s)],
+                        sizeof(record));
+            Leaf leaf;
+            node.box(grid, s, leaf.lo, leaf.hi);
+            leaves[record.primitive].push_back(leaf);
+        }
+    }
+    test::Random random(9);
+    for (uint32_t i = 0; i < 5000; i++) {
+        ASSERT_GE(leaves[i].size(), 1u) << "triangle " << i;
+        for (uint32_t k = 0; k < 20; k++) {
+            double u = random.uniform();
+            double v = random.uniform();
+            if (u + v > 1.0) u = 1.0 - u, v = 1.0 - v;
+            const Vector3d a(mesh.positions[3 * i]);
+            const Vector3d p =
+                a + u * (Vector3d(mesh.positions[3 * i + 1]) - a) + v * (Vector3d(mesh.positions[3 * i + 2]) - a);
+            // The point is off the triangle by float64's rounding, of coordinates up to 2.
+            const auto holds = [&](const Leaf& leaf) {
+                bool all = true;
+                for (int axis = 0; axis < 3; axis++)
+                    all = all && leaf.lo[axis] <= p[axis] + 1e-15 && p[axis] - 1e-15 <= leaf.hi[axis];
+                return all;
+            };
+            ASSERT_TRUE(std::any_of(leaves[i].begin(), leaves[i].end(), holds)) << "triangle " << i;
+        }
+    }
+
+    // Candidates that are not opaque come once.
+    TriangleGeometry geometry = geometryOf(mesh);
+    geometry.opaque = false;
+    EXPECT_TRUE(equal(hierarchyOf(geometry, BuildMode::Split), hierarchyOf(geometry, BuildMode::Quality)));
+    // Meshes without long triangles are as without splits.
+    const Mesh torus = createTorus(1.0f, 0.4f, 40, 20);
+    EXPECT_TRUE(equal(hierarchyOf(torus, BuildMode::Split), hierarchyOf(torus, BuildMode::Quality)));
+    // A refit would give each piece its triangle's whole box.
+    Hierarchy refitted = hierarchyOf(mesh, BuildMode::Split);
+    geometry.opaque = true;
+    EXPECT_EQ(refitHierarchy(refitted, std::span(&geometry, 1)).error().id(), "tracing.refit");
+}
+
 TEST(TracingHierarchy, HoldsItsPrimitivesForAllSizes) {
     for (const BuildMode mode : both_modes) {
         for (const uint32_t count : {0u,  1u,   2u,   3u,   7u,    8u,    9u,    15u,    16u,    17u,    63u,   64u,

@@ -171,6 +171,7 @@ TEST_F(TracingTraversal, FindsWhatFloat64Finds) {
         EXPECT_EQ(trace(hierarchy, rays, false, 1), hits);
         EXPECT_EQ(trace(hierarchy, rays, false), hits);
         EXPECT_EQ(trace(buildMesh(mesh, BuildMode::Fast), rays, true), hits);
+        EXPECT_EQ(trace(buildMesh(mesh, BuildMode::Split), rays, false), hits);
     }
 }
 

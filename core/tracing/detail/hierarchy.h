@@ -68,7 +68,10 @@ struct BoxGeometry {
 
 enum class BuildMode : uint8_t {
     Quality,  ///< surface area heuristic, optimal collapse: for tracing
-    Fast,     ///< along a Z-order curve: for structures that live for a frame
+    /// The same, with spatial splits: opaque triangles that are long and thin may have several records. For what is
+    /// never refitted, which is an error then if there are any.
+    Split,
+    Fast,  ///< along a Z-order curve: for structures that live for a frame
 };
 
 constexpr float max_coordinate = 0x1p100f;  // 1.27e30
@@ -87,7 +90,7 @@ struct Hierarchy {
     Array<Texel> texels;
     Kind kind = Kind::Triangles;
     uint32_t nodes = 0;        ///< 1 at least: the root of an empty hierarchy has no children
-    uint32_t records = 0;      ///< active primitives
+    uint32_t records = 0;      ///< active primitives; more with BuildMode::Split
     uint32_t inactive = 0;     ///< primitives that were left out
     uint32_t depth = 0;        ///< nodes on the longest way from the root; at most max_depth
     uint64_t build_bytes = 0;  ///< largest number of bytes held during the build, the result included

@@ -24,6 +24,12 @@ const uint GLINT_KIND_BOXES = 1u;
 #define GLINT_TRACING_NONE 15u
 #define GLINT_TRACING_EMPTY 0xffffffffu
 
+// How far planes are moved apart, in the largest distance of a coordinate from the ray's origin: 2^-19. Less is not
+// safe; it is a macro so that what it costs can be measured.
+#ifndef GLINT_TRACING_WIDENING
+#define GLINT_TRACING_WIDENING 1.9073486e-6
+#endif
+
 // A ray in the space of one hierarchy.
 struct GlintSpace {
     uint base;        // the hierarchy's first texel
@@ -70,7 +76,7 @@ GlintSpace glintSpace(uint base, vec3 origin, vec3 direction) {
     const float least = max(largest * 9.0949470e-13, reach * 7.5231638e-37);  // 2^-40, 2^-120
     const vec3 inverse = 1.0 / max(size, vec3(least));
     space.inverse = uintBitsToFloat(floatBitsToUint(inverse) | (floatBitsToUint(direction) & 0x80000000u));
-    space.margin = inverse * (reach * 1.9073486e-6);
+    space.margin = inverse * (reach * GLINT_TRACING_WIDENING);
 
     // The longest component's axis becomes z; the others follow it in turn, mirrored where it looks backwards, so that
     // a triangle's winding stays.

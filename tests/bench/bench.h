@@ -73,6 +73,7 @@ Benchmark tracingDriverBenchmark();
 Benchmark castBenchmark();
 Benchmark castMemoryBenchmark();
 Benchmark tracingLeaksBenchmark();
+Benchmark tracingTradeoffsBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

@@ -2,17 +2,18 @@
 // Embree's rtcIntersect1 on two threads, in turns in one run; tracing.instances.software_over_embree1, of camera rays,
 // and tracing.instances.bounce. query_over_embree1: of queries, as rewritten shaders have them, of a top level with one
 // instance in the first three scenes. tracing.build.{quality,fast,refit}: millions of triangles a second of the
-// builders, on the 1m mesh. tracing.leaks.software: rays at edges that slip through.
+// builders, on the 1m mesh. tracing.leaks.{software,driver}: rays at corners and edges of closed meshes
+// that slip through.
 
 #include "accuracy/embree.h"
 #include "bench/tracing_batch.h"
 #include "bench/tracing_scenes.h"
 #include "support/allocations.h"
 #include "support/hierarchies.h"
-#include "support/reference.h"
+#include "support/seam_rays.h"
 
-#include <glint/geometry/primitives.h>
 #include <glint/tracing/detail/hierarchy.h>
+#include <glint/tracing/detail/parallel.h>
 
 #include <fmt/format.h>
 #include <malloc.h>
@@ -20,6 +21,7 @@
 #include <array>
 #include <cmath>
 #include <ctime>
+#include <mutex>
 
 namespace glint::bench {
 
@@ -156,58 +158,86 @@ void runTracing(Report& report) {
     }
 }
 
-/// From the middle of a torus' tube at its corners and at points of its edges: a ray that meets nothing near to where
-/// it was aimed at, at t = 1, has slipped through. (Directions are rounded, so rays pass on either side of what they
-/// aim at.)
-std::vector<Ray> raysAtEdges(const Mesh& torus, uint32_t count, uint64_t seed) {
-    test::Random random(seed);
-    std::vector<Ray> rays(count);
-    for (uint32_t i = 0; i < count; i++) {
-        const uint64_t triangle = random.below(torus.triangleCount());
-        const Vector3d a(torus.positions[torus.indices[3 * triangle + i % 3]]);
-        const Vector3d b(torus.positions[torus.indices[3 * triangle + (i + 1) % 3]]);
-        const Vector3d target = i % 2 == 0 ? a : a + (b - a) * random.uniform();
-        const double angle = std::atan2(target.y, target.x) + random.uniform(-0.2, 0.2);
-        rays[i].origin = Vector3f(Vector3d(std::cos(angle), std::sin(angle), 0.0));
-        rays[i].direction = Vector3f(target - Vector3d(rays[i].origin));
+/// Traces `count` rays at the seams of each closed mesh, `chunk` at a time; returns what leaks.
+template <class Trace>
+test::SeamLeaks seamLeaks(const test::ClosedMesh& mesh, uint64_t count, uint64_t seed, const Trace& trace) {
+    constexpr uint32_t chunk = 1u << 20;
+    constexpr uint32_t piece = 1u << 16;
+    test::SeamLeaks leaks;
+    for (uint64_t begin = 0; begin < count; begin += chunk) {
+        const auto size = static_cast<uint32_t>(std::min<uint64_t>(chunk, count - begin));
+        std::vector<Ray> rays(size);
+        detail::parallelRanges(&ThreadPool::shared(), size, piece, [&](size_t first, size_t last) {
+            const auto part = test::raysAtSeams(mesh, static_cast<uint32_t>(last - first), seed + begin + first);
+            std::copy(part.begin(), part.end(), rays.begin() + static_cast<ptrdiff_t>(first));
+        });
+        const std::vector<RayHit> hits = trace(rays);
+        std::mutex mutex;
+        detail::parallelRanges(&ThreadPool::shared(), size, piece, [&](size_t first, size_t last) {
+            const test::SeamLeaks part = test::countLeaks(mesh, std::span(rays).subspan(first, last - first),
+                                                          std::span(hits).subspan(first, last - first));
+            const std::lock_guard lock(mutex);
+            leaks += part;
+        });
     }
-    return rays;
+    return leaks;
 }
 
 void runLeaks(Report& report) {
-    constexpr uint32_t batches = 16;
-    const Device device = createDevice();
-    const Mesh mesh = createTorus(1.0f, 0.4f, 100, 50);
-    const Hierarchy hierarchy = test::hierarchyOf(mesh, BuildMode::Quality, &ThreadPool::shared());
-    Device owner = device;
-    const Buffer buffer = owner.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
+    constexpr uint64_t rays = 100'000'000;
+    constexpr uint64_t driver_rays = 1'000'000;
+    Device device = createDevice();
     const Kernel kernel = createRayKernel(device, batch_kernel, "");
-    uint64_t leaks = 0;
-    uint64_t embree_leaks = 0;
-    uint64_t robust_leaks = 0;
-    const test::EmbreeScene embree(mesh, test::EmbreeMode::Fast);
-    const test::EmbreeScene robust(mesh, test::EmbreeMode::Robust);
-    const auto count = [](std::span<const RayHit> hits) {
-        return static_cast<uint64_t>(
-            std::count_if(hits.begin(), hits.end(), [](const RayHit& hit) { return !hit.isHit() || hit.t > 1.01f; }));
-    };
-    for (uint32_t i = 0; i < batches; i++) {
-        const std::vector<Ray> rays = raysAtEdges(mesh, 1u << 20, 100 + i);
-        RayBatch batch(device, kernel, buffer, rays);
-        batch.trace(static_cast<uint32_t>(rays.size()));
-        leaks += count(batch.hits());
-        if (i != 0) continue;
-        std::vector<RayHit> hits(rays.size());
-        embree.cast(rays, hits, 2);
-        embree_leaks = count(hits);
-        robust.cast(rays, hits, 2);
-        robust_leaks = count(hits);
+    const std::vector<test::ClosedMesh> meshes = test::closedMeshes();
+    test::SeamLeaks ours;
+    test::SeamLeaks driver;
+    test::SeamLeaks embree;
+    test::SeamLeaks robust;
+    const bool has_driver = device.getFeatures().computeTracing;
+    for (size_t i = 0; i < meshes.size(); i++) {
+        const test::ClosedMesh& mesh = meshes[i];
+        const uint64_t seed = (i + 1) << 32;
+        const auto share = [&](uint64_t all) { return all * (i + 1) / meshes.size() - all * i / meshes.size(); };
+        const Hierarchy hierarchy = test::hierarchyOf(mesh.mesh, BuildMode::Quality, &ThreadPool::shared());
+        const Buffer buffer = device.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
+        const test::SeamLeaks found = seamLeaks(mesh, share(rays), seed, [&](std::span<const Ray> some) {
+            RayBatch batch(device, kernel, buffer, some);
+            batch.trace(static_cast<uint32_t>(some.size()));
+            return batch.hits();
+        });
+        ours += found;
+        std::string line = fmt::format("  {:<14} {:>6} triangles: {} of {} rays leak", mesh.name,
+                                       mesh.mesh.triangleCount(), found.all(), share(rays));
+        if (has_driver) {
+            RayCaster caster = std::move(*check(RayCaster::create(device, mesh.mesh)));
+            const test::SeamLeaks theirs = seamLeaks(mesh, share(driver_rays), seed, [&](std::span<const Ray> some) {
+                return std::move(*check(caster.cast(some)));
+            });
+            driver += theirs;
+            line += fmt::format("; of {}: driver {} ({} miss, {} beyond, {} wrong)", share(driver_rays), theirs.all(),
+                                theirs.misses, theirs.beyond, theirs.wrong);
+        }
+        for (const bool is_robust : {false, true}) {
+            const test::EmbreeScene scene(mesh.mesh, is_robust ? test::EmbreeMode::Robust : test::EmbreeMode::Fast);
+            const test::SeamLeaks theirs = seamLeaks(mesh, share(driver_rays), seed, [&](std::span<const Ray> some) {
+                std::vector<RayHit> hits(some.size());
+                scene.cast(some, hits, 2);
+                return hits;
+            });
+            (is_robust ? robust : embree) += theirs;
+            line += fmt::format(", {} {}", is_robust ? "robust" : "Embree", theirs.all());
+        }
+        fmt::print("{}\n", line);
+        std::fflush(stdout);
     }
-    fmt::print("  {} of {} million rays; Embree {}, robust {} of the first million\n", leaks, batches, embree_leaks,
-               robust_leaks);
-    report.add("tracing.leaks.software", static_cast<double>(leaks), "rays",
-               fmt::format("{} rays at corners and edges of a closed torus of 10,000 triangles", batches << 20),
+    fmt::print("  all: {} of {}; driver {}, Embree {}, robust {} of {}\n", ours.all(), rays, driver.all(), embree.all(),
+               robust.all(), driver_rays);
+    const std::string what = "closed meshes of up to 20,480 triangles, aimed at corners and edges; float64";
+    report.add("tracing.leaks.software", static_cast<double>(ours.all()), fmt::format("of {} rays", rays), what,
                deviceName(device));
+    if (has_driver)
+        report.add("tracing.leaks.driver", static_cast<double>(driver.all()), fmt::format("of {} rays", driver_rays),
+                   what, deviceName(device));
 }
 
 void runBuilds(Report& report) {
@@ -264,7 +294,7 @@ Benchmark tracingSoftwareBenchmark() {
     return benchmark;
 }
 
-Benchmark tracingLeaksBenchmark() { return {{"tracing.leaks.software"}, runLeaks}; }
+Benchmark tracingLeaksBenchmark() { return {{"tracing.leaks.software", "tracing.leaks.driver"}, runLeaks}; }
 
 Benchmark tracingBuildBenchmark() {
     return {{"tracing.build.quality", "tracing.build.fast", "tracing.build.refit",

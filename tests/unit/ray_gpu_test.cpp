@@ -3,6 +3,7 @@
 
 #include "support/device_fixture.h"
 #include "support/reference.h"
+#include "support/seam_rays.h"
 #include "support/spawn_tracer.h"
 
 #include <glint/geometry/primitives.h>
@@ -100,33 +101,6 @@ TEST_F(RayHelpers, SegmentsMeetNeitherEnd) {
     });
 }
 
-/// The faces of a cube from -1 to 1, each of cells * cells squares in two triangles: all corners are in its planes.
-Mesh cubeOfCells(uint32_t cells) {
-    Mesh mesh;
-    for (int face = 0; face < 6; face++) {
-        const int axis = face / 2;
-        const float side = face % 2 == 0 ? -1.0f : 1.0f;
-        const auto first = static_cast<uint32_t>(mesh.positions.size());
-        for (uint32_t y = 0; y <= cells; y++) {
-            for (uint32_t x = 0; x <= cells; x++) {
-                Vector3f p;
-                p[axis] = side;
-                p[(axis + 1) % 3] = (2.0f * static_cast<float>(x) / static_cast<float>(cells) - 1.0f) * side;
-                p[(axis + 2) % 3] = 2.0f * static_cast<float>(y) / static_cast<float>(cells) - 1.0f;
-                mesh.positions.push_back(p);
-            }
-        }
-        for (uint32_t y = 0; y < cells; y++) {
-            for (uint32_t x = 0; x < cells; x++) {
-                const uint32_t i = first + y * (cells + 1) + x;
-                for (const uint32_t corner : {i, i + 1, i + cells + 2, i, i + cells + 2, i + cells + 1})
-                    mesh.indices.push_back(corner);
-            }
-        }
-    }
-    return mesh;
-}
-
 /// A tilted plane: its corners are rounded, so triangles that share an edge are flat but for that.
 Mesh tiltedPlane() {
     Mesh mesh = createPlane(2.0f, 16);
@@ -167,7 +141,7 @@ bool shareEdge(const Mesh& mesh, uint32_t triangle, uint32_t other) {
 
 TEST_F(RayHelpers, RaysDoNotMeetNeighbours) {
     const std::pair<const char*, Mesh> meshes[] = {
-        {"sphere", createSphere(1.0f, 3)}, {"cube", cubeOfCells(8)}, {"tilted plane", tiltedPlane()}};
+        {"sphere", createSphere(1.0f, 3)}, {"cube", createCellCube(8)}, {"tilted plane", tiltedPlane()}};
     withEngines([&](SpawnTracer& tracer, uint32_t rays) {
         for (const auto& [name, mesh] : meshes) {
             const bool convex = std::string_view(name) != "tilted plane";

@@ -5,6 +5,7 @@
 #include "support/reference.h"
 
 #include <glint/geometry/primitives.h>
+#include <glint/math/ray.h>
 
 #include <atomic>
 #include <cmath>
@@ -79,19 +80,15 @@ std::vector<Ray> bounceRays(const TracingScene& scene) {
     result.reserve(rays.size());
     for (size_t i = 0; i < rays.size(); i++) {
         if (!hits[i].isHit()) continue;
-        Vector3f corners[3];
-        for (size_t c = 0; c < 3; c++) {
-            corners[c] = mesh.positions[mesh.indices[3 * size_t(hits[i].primitive) + c]];
-            if (!scene.instances.empty())
-                corners[c] = transformPoint(scene.instances[instances[i]].matrix(), corners[c]);
-        }
-        Vector3f normal = glm::normalize(glm::cross(corners[1] - corners[0], corners[2] - corners[0]));
-        if (glm::dot(normal, rays[i].direction) > 0.0f) normal = -normal;
-        // Far beyond the rounding of the hit, far below the size of what is seen.
-        const float offset = scene.instances.empty() ? 1e-4f : 1e-3f;
+        const uint32_t* corner = &mesh.indices[3 * size_t(hits[i].primitive)];
+        const Transform3x4 transform = scene.instances.empty() ? Transform3x4() : scene.instances[instances[i]];
+        const SurfacePoint point =
+            surfacePoint(mesh.positions[corner[0]], mesh.positions[corner[1]], mesh.positions[corner[2]],
+                         {hits[i].u, hits[i].v}, transform, inverse(transform));
+        const Vector3f normal = glm::dot(point.normal, rays[i].direction) > 0.0f ? -point.normal : point.normal;
         Ray ray;
-        ray.origin = rays[i].origin + rays[i].direction * hits[i].t + normal * offset;
         ray.direction = glm::normalize(normal * 1.0001f + Vector3f(random.direction()));
+        ray.origin = spawnPoint(point, ray.direction);
         result.push_back(ray);
     }
     return result;

@@ -4,8 +4,8 @@ set grid lc rgb '#dddddd'
 
 set output images.'/tradeoff_widening.svg'
 set title 'Widening of boxes: leaks against time'
-set xlabel 'widening over the reach, log_2 (leftmost: none)'
-set ylabel 'leaks of a million rays at corners and edges, and 0.1 for none'
+set xlabel 'logarithm of the widening over the reach, base 2 (leftmost: none)'
+set ylabel 'leaks of a million rays (0.1: none)'
 set y2label 'time over that without widening'
 set logscale y
 set format y '10^{%T}'
@@ -53,7 +53,7 @@ set y2range [0:1]
 set y2tics 0.2
 set xrange [2**-7.3:2**4.3]
 set xtics ('0' 2**-7, '1/64' 2**-6, '1/32' 2**-5, '1/16' 2**-4, '1/8' 2**-3, '1/4' 2**-2, '1/2' 0.5, '1' 1, '2' 2, '4' 4, '8' 8, '16' 16)
-set key center right
+set key at graph 0.83, graph 0.98
 set arrow from 1, graph 0 to 1, graph 1 nohead dt 3 lc rgb '#888888'
 x(m) = m > 0 ? m : 2**-7
 # What is 0 is not drawn: curves end where no ray of two million meets what it leaves.

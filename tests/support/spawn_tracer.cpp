@@ -4,7 +4,6 @@
 #include "support/reference.h"
 
 #include <glint/math/ray.h>
-#include <glint/tracing/detail/instances.h>
 
 #include <array>
 #include <cmath>
@@ -188,7 +187,7 @@ Mesh triangleSoup(const Vector3d& place) {
 }  // namespace
 
 std::vector<SpawnCase> spawnCases() {
-    const Mesh soup = triangleSoup(Vector3d(0.0));
+    const Mesh shapes = triangleSoup(Vector3d(0.0));
     const auto turned = [](const Matrix4x4f& matrix) {
         return Transform3x4(rotateX(31.0f) * rotateZ(57.0f) * matrix * rotateY(23.0f) * rotateX(71.0f));
     };
@@ -197,15 +196,15 @@ std::vector<SpawnCase> spawnCases() {
     };
     const auto uniform = [&](float size) { return turned(scale(Vector3f(size))); };
     return {
-        {"identity", soup, {Transform3x4()}},
+        {"identity", shapes, {Transform3x4()}},
         {"object far", triangleSoup({1000.0, -700.0, 300.0}), {Transform3x4()}},
-        {"turned", soup, {uniform(1.0f)}},
-        {"scaled 1e-4", soup, {moved(1, 2, -3, uniform(1e-4f))}},
-        {"scaled 1e4", soup, {moved(100, 20, -3, uniform(1e4f))}},
-        {"stretched", soup, {moved(1, 2, -3, turned(scale({1, 1, 1000})))}},
-        {"squashed", soup, {moved(1, 2, -3, turned(scale({1, 1, 1e-3f})))}},
-        {"mirrored", soup, {moved(1, 2, -3, turned(scale({1, -1, 1})))}},
-        {"moved 1e7", soup, {moved(1e7f, -1e7f, 0.7e7f, uniform(1e3f))}},
+        {"turned", shapes, {uniform(1.0f)}},
+        {"scaled 1e-4", shapes, {moved(1, 2, -3, uniform(1e-4f))}},
+        {"scaled 1e4", shapes, {moved(100, 20, -3, uniform(1e4f))}},
+        {"stretched", shapes, {moved(1, 2, -3, turned(scale({1, 1, 1000})))}},
+        {"squashed", shapes, {moved(1, 2, -3, turned(scale({1, 1, 1e-3f})))}},
+        {"mirrored", shapes, {moved(1, 2, -3, turned(scale({1, -1, 1})))}},
+        {"moved 1e7", shapes, {moved(1e7f, -1e7f, 0.7e7f, uniform(1e3f))}},
         {"mirrored, stretched, moved, object far",
          triangleSoup({30.0, -7.0, 10.0}),
          {moved(1e4f, -2e4f, 3e3f, turned(scale({1, -30, 300})))}},
@@ -277,22 +276,7 @@ std::vector<SpawnResult> SpawnTracer::trace(const SpawnCase& scene, std::span<co
         need(device_.buildTracings({bottom, top}));
         compute.setTracing(0, top);
     } else {
-        using namespace detail;
-        const Hierarchy model = hierarchyOf(scene.mesh);
-        std::vector<HierarchyInstance> list(scene.transforms.size());
-        for (size_t i = 0; i < list.size(); i++) {
-            list[i].transform = scene.transforms[i];
-            list[i].bounds = boundsOf(model);
-        }
-        const auto build = [&] {
-            return std::move(*need(buildHierarchy(std::span<const HierarchyInstance>(list), BuildMode::Quality)));
-        };
-        // The model follows the instances, whose size does not depend on where it is.
-        const auto place = static_cast<uint32_t>(build().texels.size());
-        for (HierarchyInstance& instance : list) instance.texel = place;
-        const Hierarchy instances = build();
-        std::vector<Texel> all(instances.texels.begin(), instances.texels.end());
-        all.insert(all.end(), model.texels.begin(), model.texels.end());
+        const std::vector<detail::Texel> all = instancesOf(hierarchyOf(scene.mesh), scene.transforms);
         texels = device_.createBuffer(Buffer::FlagTexel, std::span(all));
         compute.setTexelBuffer(0, texels, FormatRGBAu32);
     }

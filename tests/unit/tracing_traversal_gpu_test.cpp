@@ -595,12 +595,12 @@ TEST_F(TracingTraversal, TracesInstancesInBatches) {
         ASSERT_EQ(hit.isHit(), expected[i].type != 0) << "ray " << i;
         if (!hit.isHit()) continue;
         met++;
-        twice += found[i].instance + 1 < instances.size() &&
-                         instances[found[i].instance].transform == instances[found[i].instance + 1].transform
+        twice += found[i].hit.instance + 1 < instances.size() &&
+                         instances[found[i].hit.instance].transform == instances[found[i].hit.instance + 1].transform
                      ? 1
                      : 0;
         // The same arithmetic, so the same bits.
-        ASSERT_EQ(found[i].instance, expected[i].instance) << "ray " << i;
+        ASSERT_EQ(found[i].hit.instance, expected[i].instance) << "ray " << i;
         ASSERT_EQ(hit.primitive, expected[i].primitive) << "ray " << i;
         ASSERT_EQ(hit.t, expected[i].t) << "ray " << i;
         ASSERT_EQ(Vector2f(hit.u, hit.v), expected[i].barycentrics) << "ray " << i;

@@ -17,7 +17,6 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <ctime>
 #include <limits>
 
 namespace glint::bench {
@@ -33,13 +32,13 @@ Buffer upload(Device device, const Hierarchy& hierarchy) {
 
 /// Best times of several batches that take turns, in processor time, which does not depend on what else runs. The first
 /// turn, when kernels are compiled, does not count.
-std::vector<double> bestTimes(std::span<Batch> batches, uint32_t rays, uint32_t turns) {
+std::vector<double> bestTimes(std::span<RayBatch> batches, uint32_t rays, uint32_t turns) {
     std::vector<Times> times(batches.size());
     for (uint32_t turn = 0; turn <= turns; turn++) {
         for (size_t i = 0; i < batches.size(); i++) {
-            const std::clock_t begin = std::clock();
+            const double begin = processSeconds();
             batches[i].trace(rays);
-            if (turn != 0) times[i].values.push_back(static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC);
+            if (turn != 0) times[i].values.push_back(processSeconds() - begin);
         }
     }
     std::vector<double> best;
@@ -56,15 +55,16 @@ void compareWidenings(Report& report, const TracingScene& scene) {
     const std::vector<int> exponents = {0, -26, -25, -24, -23, -22, -21, -20, -19, -18, -17, -16, -14, -12};
     std::vector<Kernel> kernels;
     for (const int exponent : exponents)
-        kernels.push_back(createKernel(
-            device, {"", fmt::format("GLINT_TRACING_WIDENING={:.9e}", exponent == 0 ? 0.0 : std::exp2(exponent))}));
+        kernels.push_back(
+            createRayKernel(device, batch_kernel,
+                            fmt::format("GLINT_TRACING_WIDENING={:.9e}", exponent == 0 ? 0.0 : std::exp2(exponent))));
 
     const Hierarchy hierarchy = test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
     const Buffer buffer = upload(device, hierarchy);
     std::vector<double> seconds[2];
     for (const bool bounce : {false, true}) {
         const auto& rays = bounce ? scene.bounce : scene.camera;
-        std::vector<Batch> batches;
+        std::vector<RayBatch> batches;
         for (const Kernel& kernel : kernels) batches.emplace_back(device, kernel, buffer, rays);
         seconds[bounce] = bestTimes(batches, static_cast<uint32_t>(rays.size()), 5);
     }
@@ -75,7 +75,7 @@ void compareWidenings(Report& report, const TracingScene& scene) {
         const Buffer closed = upload(device, test::hierarchyOf(mesh.mesh));
         const std::vector<Ray> rays = test::raysAtSeams(mesh, leak_rays, 77);
         for (size_t i = 0; i < exponents.size(); i++) {
-            Batch batch(device, kernels[i], closed, rays);
+            RayBatch batch(device, kernels[i], closed, rays);
             batch.trace(leak_rays);
             const std::vector<RayHit> hits = batch.hits();
             // Quicker than with bounds, which every hit of the test of leaks is held to.
@@ -279,7 +279,7 @@ Hierarchy encoded(const ExactTree& tree, const std::vector<std::array<Box, 8>>& 
 void compareQuantisation(Report& report, const TracingScene& scene) {
     constexpr size_t stride = 61;
     const Device device = createDevice();
-    const Kernel kernel = createKernel(device, {"", ""});
+    const Kernel kernel = createRayKernel(device, batch_kernel, "");
     const Hierarchy hierarchy = test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
     const ExactTree tree(hierarchy);
     struct Row {
@@ -317,13 +317,13 @@ void compareQuantisation(Report& report, const TracingScene& scene) {
     }
     for (const bool bounce : {false, true}) {
         const auto& rays = bounce ? scene.bounce : scene.camera;
-        std::vector<Batch> batches;
+        std::vector<RayBatch> batches;
         for (const Buffer& buffer : buffers) batches.emplace_back(device, kernel, buffer, rays);
         const std::vector<double> seconds = bestTimes(batches, static_cast<uint32_t>(rays.size()), 5);
         for (size_t i = 0; i < seconds.size(); i++) rows[i + 1].seconds[bounce] = seconds[i];
         // All have the same hits: boxes decide what is tried, never what is found.
         const std::vector<RayHit> hits = batches.back().hits();
-        for (Batch& batch : batches)
+        for (RayBatch& batch : batches)
             if (batch.hits() != hits) throw std::runtime_error("hits depend on the boxes");
     }
     std::rotate(rows.begin(), rows.begin() + 1, rows.end());

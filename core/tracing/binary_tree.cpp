@@ -124,7 +124,8 @@ Split cheapest(const Bins& bins, const Binning& binning, uint32_t count, Float4 
 
 class Builder {
 public:
-    Builder(BinaryTree& tree, BuildMode mode, ThreadPool* pool) : tree_(tree), mode_(mode), pool_(pool) {}
+    Builder(BinaryTree& tree, BuildMode mode, uint32_t width, ThreadPool* pool)
+        : tree_(tree), mode_(mode), width_(width), pool_(pool) {}
 
     void run() {
         const auto count = static_cast<uint32_t>(tree_.refs.size());
@@ -211,7 +212,7 @@ private:
                 cheapest[i] = std::min(cheapest[i], left_costs[l] + right_costs[i - l]);
         }
         float* costs = tree_.costs[index].costs;
-        costs[0] = cheapest[CollapseCost::count - 1] + halfArea(box, tree_.area_scale);
+        costs[0] = cheapest[width_ - 2] + halfArea(box, tree_.area_scale);
         for (uint32_t i = 1; i < CollapseCost::count; i++) costs[i] = std::min(costs[i - 1], cheapest[i - 1]);
     }
 
@@ -347,6 +348,7 @@ private:
 
     BinaryTree& tree_;
     const BuildMode mode_;
+    const uint32_t width_;
     ThreadPool* const pool_;
     uint32_t task_size_ = 0;
     Array<PrimRef> scratch_;
@@ -357,7 +359,7 @@ private:
 
 }  // namespace
 
-BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mode, ThreadPool* pool) {
+BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mode, uint32_t width, ThreadPool* pool) {
     if (mode == BuildMode::Split) mode = BuildMode::Quality;
     BinaryTree tree;
     tree.refs = std::move(refs);
@@ -370,7 +372,7 @@ BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mo
         tree.build_bytes = tree.bytes();
         return tree;
     }
-    Builder builder(tree, mode, pool);
+    Builder builder(tree, mode, width, pool);
     if (mode == BuildMode::Fast) builder.codes = sortByCode(tree.refs, bounds, pool);
     builder.run();
     return tree;

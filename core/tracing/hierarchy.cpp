@@ -77,8 +77,44 @@ Expected<Gathered> gather(std::span<const typename Reader::Geometry> geometries,
     return result;
 }
 
+/// Builds the nodes into `result`, whose form is Node's, with room for the records behind them. Returns the primitives
+/// in the order of their records.
+template <class Node>
+Array<uint32_t> buildNodes(Gathered gathered, const Grid& grid, BuildMode mode, ThreadPool* pool, Hierarchy& result) {
+    WideTree<Node> wide;
+    Array<uint32_t> order(gathered.active);
+    if (gathered.active == 0) {
+        wide.nodes = Array<Node>(1);
+        wide.nodes[0] = Node::encode(grid, nullptr, 0, 0, 0, 0);
+        wide.depth = 1;
+        wide.runs = {0, 1};
+    } else {
+        const BinaryTree tree = buildBinaryTree(std::move(gathered.refs), gathered.bounds, mode, Node::width, pool);
+        wide = collapse<Node>(tree, grid, pool);
+        parallelRanges(pool, order.size(), grain, [&](size_t begin, size_t end) {
+            for (size_t i = begin; i < end; i++) order[i] = tree.refs[wide.order[i]].id();
+        });
+        // While the wide nodes are made, each subtree's are copied to their places.
+        result.build_bytes =
+            std::max(tree.build_bytes, tree.bytes() + 2 * wide.nodes.size() * sizeof(Node) + 12 * order.size());
+    }
+    result.nodes = static_cast<uint32_t>(wide.nodes.size());
+    result.depth = wide.depth;
+    result.runs = std::move(wide.runs);
+    result.texels = Array<Texel>(result.firstRecord() + 3 * size_t(result.records));
+    result.build_bytes =
+        std::max(result.build_bytes, result.bytes() + wide.nodes.size() * sizeof(Node) + 4 * order.size());
+    std::fill_n(result.texels.begin(), texelsOf(Node::form), Texel{});
+    parallelRanges(pool, wide.nodes.size(), grain, [&](size_t begin, size_t end) {
+        std::memcpy(&result.texels[texelsOf(Node::form) * (begin + 1)], &wide.nodes[begin],
+                    (end - begin) * sizeof(Node));
+    });
+    return order;
+}
+
 template <class Reader>
-Expected<Hierarchy> build(std::span<const typename Reader::Geometry> geometries, BuildMode mode, ThreadPool* pool) {
+Expected<Hierarchy> build(std::span<const typename Reader::Geometry> geometries, BuildMode mode, ThreadPool* pool,
+                          NodeForm form) {
     const std::vector<uint64_t> first = firstPrimitives(geometries, Reader::count);
     if (first.back() > max_primitives) {
         return unexpected(makeError(ErrorCode::OutOfRange, "tracing.too_large",
@@ -90,6 +126,7 @@ Expected<Hierarchy> build(std::span<const typename Reader::Geometry> geometries,
 
     Hierarchy result;
     result.kind = Reader::kind;
+    result.form = form;
     result.inactive = static_cast<uint32_t>(first.back()) - gathered->active;
     if (Reader::kind == Hierarchy::Kind::Triangles && mode == BuildMode::Split) {
         gathered->refs = splitBoxes(
@@ -104,34 +141,11 @@ Expected<Hierarchy> build(std::span<const typename Reader::Geometry> geometries,
     }
     result.records = gathered->active;
     const Grid grid = makeGrid(gathered->bounds);
-    WideTree wide;
-    Array<uint32_t> order(gathered->active);
-    if (gathered->active == 0) {
-        wide.nodes = Array<Node>(1);
-        wide.nodes[0] = encodeNode(grid, nullptr, 0, 0, 0, 0);
-        wide.depth = 1;
-        wide.runs = {0, 1};
-    } else {
-        const BinaryTree tree = buildBinaryTree(std::move(gathered->refs), gathered->bounds, mode, pool);
-        wide = collapse(tree, grid, pool);
-        parallelRanges(pool, order.size(), grain, [&](size_t begin, size_t end) {
-            for (size_t i = begin; i < end; i++) order[i] = tree.refs[wide.order[i]].id();
-        });
-        // While the wide nodes are made, each subtree's are copied to their places.
-        result.build_bytes =
-            std::max(tree.build_bytes, tree.bytes() + 2 * wide.nodes.size() * sizeof(Node) + 12 * order.size());
-    }
-
-    result.nodes = static_cast<uint32_t>(wide.nodes.size());
-    result.depth = wide.depth;
-    result.runs = std::move(wide.runs);
-    result.texels = Array<Texel>(result.firstRecord() + 3 * size_t(result.records));
-    result.build_bytes =
-        std::max(result.build_bytes, result.bytes() + wide.nodes.size() * sizeof(Node) + 4 * order.size());
-    writeHeader(result, grid, gathered->bounds);
-    parallelRanges(pool, wide.nodes.size(), grain, [&](size_t begin, size_t end) {
-        std::memcpy(&result.texels[4 * (begin + 1)], &wide.nodes[begin], (end - begin) * sizeof(Node));
-    });
+    const Box4 bounds = gathered->bounds;
+    const Array<uint32_t> order = form == NodeForm::Packed
+                                      ? buildNodes<Node>(std::move(*gathered), grid, mode, pool, result)
+                                      : buildNodes<FullNode>(std::move(*gathered), grid, mode, pool, result);
+    writeHeader(result, grid, bounds);
     parallelRanges(pool, order.size(), grain, [&](size_t begin, size_t end) {
         for (size_t i = begin; i < end; i++) {
             const size_t g = std::upper_bound(first.begin(), first.end(), order[i]) - first.begin() - 1;
@@ -166,12 +180,14 @@ void writeHeader(Hierarchy& hierarchy, const Grid& grid, const Box4& bounds) {
     std::memcpy(hierarchy.texels.data(), &header, sizeof(header));
 }
 
-Expected<Hierarchy> buildHierarchy(std::span<const TriangleGeometry> geometries, BuildMode mode, ThreadPool* pool) {
-    return build<TriangleReader>(geometries, mode, pool);
+Expected<Hierarchy> buildHierarchy(std::span<const TriangleGeometry> geometries, BuildMode mode, ThreadPool* pool,
+                                   NodeForm form) {
+    return build<TriangleReader>(geometries, mode, pool, form);
 }
 
-Expected<Hierarchy> buildHierarchy(std::span<const BoxGeometry> geometries, BuildMode mode, ThreadPool* pool) {
-    return build<BoxReader>(geometries, mode, pool);
+Expected<Hierarchy> buildHierarchy(std::span<const BoxGeometry> geometries, BuildMode mode, ThreadPool* pool,
+                                   NodeForm form) {
+    return build<BoxReader>(geometries, mode, pool, form);
 }
 
 }  // namespace glint::detail

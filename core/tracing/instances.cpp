@@ -2,9 +2,9 @@
 
 #include <glint/tracing/detail/header.h>
 #include <glint/tracing/detail/parallel.h>
+#include <glint/tracing/detail/rounded.h>
 
 #include <cmath>
-#include <limits>
 
 namespace glint::detail {
 
@@ -39,13 +39,6 @@ bool invert(const Transform3x4& transform, float to_object[12]) {
     return finite;
 }
 
-float roundedDown(double x) {
-    const auto f = static_cast<float>(x);
-    return f > x ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
-}
-
-float roundedUp(double x) { return -roundedDown(-x); }
-
 }  // namespace
 
 BoundBox boundsOf(const Hierarchy& hierarchy) {
@@ -75,7 +68,8 @@ BoundBox worldBounds(const HierarchyInstance& instance) {
     return world;
 }
 
-Expected<Hierarchy> buildHierarchy(std::span<const HierarchyInstance> instances, BuildMode mode, ThreadPool* pool) {
+Expected<Hierarchy> buildHierarchy(std::span<const HierarchyInstance> instances, BuildMode mode, ThreadPool* pool,
+                                   NodeForm form) {
     Array<float> boxes(6 * instances.size());
     Array<InstanceRecord> records(instances.size());
     parallelRanges(pool, instances.size(), 1024, [&](size_t begin, size_t end) {
@@ -97,7 +91,7 @@ Expected<Hierarchy> buildHierarchy(std::span<const HierarchyInstance> instances,
     BoxGeometry geometry;
     geometry.boxes = reinterpret_cast<const std::byte*>(boxes.data());
     geometry.count = static_cast<uint32_t>(instances.size());
-    Expected<Hierarchy> hierarchy = buildHierarchy(std::span<const BoxGeometry>(&geometry, 1), mode, pool);
+    Expected<Hierarchy> hierarchy = buildHierarchy(std::span<const BoxGeometry>(&geometry, 1), mode, pool, form);
     if (!hierarchy) return hierarchy;
 
     const Array<Texel> nodes = std::move(hierarchy->texels);

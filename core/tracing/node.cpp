@@ -1,5 +1,7 @@
 #include <glint/tracing/detail/node.h>
 
+#include <glint/tracing/detail/rounded.h>
+
 #include <bit>
 #include <cmath>
 
@@ -11,6 +13,8 @@ double powerOfTwo(int exponent) { return std::bit_cast<double>(static_cast<uint6
 
 // A node begins below its boxes by one unit of its scale, which is 2^12 steps at most, and a step for rounding.
 constexpr double margin_steps = 4097.0;
+
+constexpr float infinity = std::numeric_limits<float>::infinity();
 
 /// The plane of child s in units of the node's scale: its byte, and those before it as a fraction.
 double planeOf(const uint32_t words[2], uint32_t s) {
@@ -65,10 +69,10 @@ void Node::box(const Grid& grid, uint32_t s, double lo[3], double hi[3]) const {
     }
 }
 
-Node encodeNode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t leaves, uint32_t first_node,
-                uint32_t first_record) {
-    float lo[node_width][4];
-    float hi[node_width][4];
+Node Node::encode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t leaves, uint32_t first_node,
+                  uint32_t first_record) {
+    float lo[width][4];
+    float hi[width][4];
     Box4 all;
     for (uint32_t s = 0; s < count; s++) {
         boxes[s].lo.store(lo[s]);
@@ -131,6 +135,33 @@ Node encodeNode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t le
     node.words[1] = origins[1] | exponents[1] << 20 | (origins[2] >> 8 & 255u) << 24;
     node.words[2] = leaves | count << 4 | (first_node - leaves) << 8;
     node.words[3] = origins[2] >> 16 | exponents[2] << 4 | first_record << 8;
+    return node;
+}
+
+void FullNode::box(const Grid& grid, uint32_t s, double lo[3], double hi[3]) const {
+    for (uint32_t axis = 0; axis < 3; axis++) {
+        lo[axis] = double(grid.minimum[axis]) + std::bit_cast<float>(words[4 + 8 * axis + s]);
+        hi[axis] = double(grid.minimum[axis]) + std::bit_cast<float>(words[8 + 8 * axis + s]);
+    }
+}
+
+FullNode FullNode::encode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t leaves, uint32_t first_node,
+                          uint32_t first_record) {
+    FullNode node = {};
+    node.words[2] = leaves | count << 4 | (first_node - leaves) << 8;
+    node.words[3] = first_record << 8;
+    for (uint32_t s = 0; s < width; s++) {
+        float lo[4] = {infinity, infinity, infinity, 0.0f};
+        float hi[4] = {-infinity, -infinity, -infinity, 0.0f};
+        if (s < count) {
+            boxes[s].lo.store(lo);
+            boxes[s].hi.store(hi);
+        }
+        for (uint32_t axis = 0; axis < 3; axis++) {
+            node.words[4 + 8 * axis + s] = std::bit_cast<uint32_t>(differenceDown(lo[axis], grid.minimum[axis]));
+            node.words[8 + 8 * axis + s] = std::bit_cast<uint32_t>(differenceUp(hi[axis], grid.minimum[axis]));
+        }
+    }
     return node;
 }
 

@@ -7,7 +7,7 @@ namespace glint::detail {
 
 namespace {
 
-template <class Reader>
+template <class Reader, class Node>
 class Refit {
 public:
     Refit(Hierarchy& hierarchy, std::span<const typename Reader::Geometry> geometries, ThreadPool* pool)
@@ -51,10 +51,10 @@ private:
     void encode(const Grid& grid, size_t begin, size_t end) {
         for (size_t place = end; place-- > begin;) {
             Node node;
-            std::memcpy(&node, &hierarchy_.texels[4 * (place + 1)], sizeof(Node));
+            std::memcpy(&node, &hierarchy_.texels[texelsOf(Node::form) * (place + 1)], sizeof(Node));
             const uint32_t children = node.children();
             const uint32_t leaves = node.leaves();
-            Box4 boxes[node_width];
+            Box4 boxes[Node::width];
             for (uint32_t s = 0; s < leaves; s++) {
                 float values[9];
                 std::memcpy(values, recordAt(node.record() + s), sizeof(values));
@@ -64,8 +64,8 @@ private:
             Box4 all;
             for (uint32_t s = 0; s < children; s++) all.add(boxes[s]);
             boxes_[place + 1] = all;
-            const Node encoded = encodeNode(grid, boxes, children, leaves, node.child(leaves), node.record());
-            std::memcpy(&hierarchy_.texels[4 * (place + 1)], &encoded, sizeof(Node));
+            const Node encoded = Node::encode(grid, boxes, children, leaves, node.child(leaves), node.record());
+            std::memcpy(&hierarchy_.texels[texelsOf(Node::form) * (place + 1)], &encoded, sizeof(Node));
         }
     }
 
@@ -84,7 +84,10 @@ Status refit(Hierarchy& hierarchy, std::span<const typename Reader::Geometry> ge
                          "a structure of {} primitives cannot take the coordinates of {}{}", expected, count,
                          hierarchy.kind != Reader::kind ? " of another kind" : "");
     }
-    Refit<Reader>(hierarchy, geometries, pool).run();
+    if (hierarchy.form == NodeForm::Packed)
+        Refit<Reader, Node>(hierarchy, geometries, pool).run();
+    else
+        Refit<Reader, FullNode>(hierarchy, geometries, pool).run();
     return {};
 }
 

@@ -2,14 +2,19 @@
 
 #include <glint/tracing/detail/parallel.h>
 
+#include <bit>
 #include <cstring>
 
 namespace glint::detail {
 
 namespace {
 
-constexpr uint32_t height_per_level = 3;
-static_assert((BinaryTree::max_height + height_per_level - 1) / height_per_level <= max_depth);
+/// By how much a node lowers the height if it opens its highest children: eight children take three binary levels.
+template <class Node>
+constexpr uint32_t height_per_level = std::bit_width(Node::width) - 1;
+template <class Node>
+constexpr bool fits = BinaryTree::max_height <= height_per_level<Node> * maxDepth(Node::form);
+static_assert(fits<Node> && fits<FullNode>);
 
 /// A node to be: a binary subtree over the refs [begin, end), whose wide node has the place `node`.
 struct Item {
@@ -22,31 +27,34 @@ struct Item {
     uint32_t count() const { return end - begin; }
 };
 
+template <class Node>
 struct Children {
-    Item items[node_width];
+    Item items[Node::width];
     uint32_t count = 0;
 };
 
 /// Nodes and records of the top or of one subtree, counted from 0.
+template <class Node>
 struct Run {
     std::vector<Node> nodes;
     std::vector<uint32_t> order;
     uint32_t depth = 0;
 };
 
+template <class Node>
 class Collapse {
 public:
     Collapse(const BinaryTree& tree, const Grid& grid) : tree_(tree), grid_(grid) {}
 
     /// Writes the node of an item into `node`, and appends room for its children to the run. Returns them.
-    Children open(const Item& item, Node& node, Run& run) const {
-        Children children;
-        collect(item, node_width, children);
+    Children<Node> open(const Item& item, Node& node, Run<Node>& run) const {
+        Children<Node> children;
+        collect(item, Node::width, children);
         // So many levels are enough for a subtree as high as that, if the highest children are opened first; when the
         // others would leave too few, that is done. See docs/tracing.md, "Depth".
         uint32_t height = 0;
         for (uint32_t s = 0; s < children.count; s++) height = std::max(height, heightOf(children.items[s]));
-        if (height > height_per_level * (max_depth - 1 - item.level)) {
+        if (height > height_per_level<Node> * (maxDepth(Node::form) - 1 - item.level)) {
             children = {};
             openHighest(item, children);
         }
@@ -56,7 +64,7 @@ public:
         const auto first_record = static_cast<uint32_t>(run.order.size());
         const auto first_node = static_cast<uint32_t>(run.nodes.size());
         uint32_t leaves = 0;
-        Box4 boxes[node_width];
+        Box4 boxes[Node::width];
         for (uint32_t s = 0; s < children.count; s++) {
             Item& child = children.items[s];
             boxes[s] = tree_.box(child.child);
@@ -70,13 +78,13 @@ public:
         }
         run.nodes.resize(first_node + children.count - leaves);
         run.depth = std::max(run.depth, item.level + 1);
-        node = encodeNode(grid_, boxes, children.count, leaves, first_node, first_record);
+        node = Node::encode(grid_, boxes, children.count, leaves, first_node, first_record);
         return children;
     }
 
     /// All that is below an item, whose own node is kept apart.
-    void openAll(const Item& item, Node& node, Run& run) const {
-        const Children children = open(item, node, run);
+    void openAll(const Item& item, Node& node, Run<Node>& run) const {
+        const Children<Node> children = open(item, node, run);
         for (uint32_t s = 0; s < children.count; s++) {
             const Item& child = children.items[s];
             if (child.child.isLeaf()) continue;
@@ -94,13 +102,13 @@ private:
     Item rightOf(const Item& item) const { return {nodeOf(item).right, item.child.index() + 1, item.end, 0, 0}; }
 
     /// As the costs were found.
-    void collect(const Item& item, uint32_t most, Children& children) const {
+    void collect(const Item& item, uint32_t most, Children<Node>& children) const {
         if (item.child.isLeaf()) {
             children.items[children.count++] = item;
             return;
         }
         const float* costs = collapseCosts(tree_, item.child);
-        while (most > 1 && most <= CollapseCost::count && costs[most - 1] == costs[most - 2]) most--;
+        while (most > 1 && most < Node::width && costs[most - 1] == costs[most - 2]) most--;
         if (most == 1) {
             children.items[children.count++] = item;
             return;
@@ -120,11 +128,11 @@ private:
         collect(rightOf(item), most - best, children);
     }
 
-    void openHighest(const Item& item, Children& children) const {
+    void openHighest(const Item& item, Children<Node>& children) const {
         children.items[0] = leftOf(item);
         children.items[1] = rightOf(item);
         children.count = 2;
-        while (children.count < node_width) {
+        while (children.count < Node::width) {
             Item* highest = children.items;
             for (uint32_t s = 1; s < children.count; s++) {
                 if (heightOf(children.items[s]) > heightOf(*highest)) highest = &children.items[s];
@@ -142,12 +150,13 @@ private:
 
 }  // namespace
 
-WideTree collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool) {
-    const Collapse collapse(tree, grid);
+template <class Node>
+WideTree<Node> collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool) {
+    const Collapse<Node> nodes(tree, grid);
     const auto count = static_cast<uint32_t>(tree.refs.size());
     const uint32_t task_size = std::max(4096u, count / 64);
 
-    Run top;
+    Run<Node> top;
     top.nodes.resize(1);
     std::vector<Item> tasks;
     std::vector<Item> open = {{tree.root, 0, count, 0, 0}};
@@ -158,28 +167,28 @@ WideTree collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool) {
             continue;
         }
         Node node;
-        const Children children = collapse.open(item, node, top);
+        const Children<Node> children = nodes.open(item, node, top);
         top.nodes[item.node] = node;
         for (uint32_t s = 0; s < children.count; s++) {
             if (!children.items[s].child.isLeaf()) open.push_back(children.items[s]);
         }
     }
 
-    std::vector<Run> runs(tasks.size());
+    std::vector<Run<Node>> runs(tasks.size());
     std::vector<Node> task_nodes(tasks.size());
     parallelFor(pool, tasks.size(), [&](size_t i) {
         runs[i].nodes.reserve(tasks[i].count() / 4 + 8);
         runs[i].order.reserve(tasks[i].count());
-        collapse.openAll(tasks[i], task_nodes[i], runs[i]);
+        nodes.openAll(tasks[i], task_nodes[i], runs[i]);
     });
 
     // Each run gets its place, and what it counted from 0 is moved there.
-    WideTree wide;
+    WideTree<Node> wide;
     wide.depth = top.depth;
     wide.runs = {0, static_cast<uint32_t>(top.nodes.size())};
     std::vector<uint32_t> first_records;
     auto records = static_cast<uint32_t>(top.order.size());
-    for (const Run& run : runs) {
+    for (const Run<Node>& run : runs) {
         wide.depth = std::max(wide.depth, run.depth);
         wide.runs.push_back(wide.runs.back() + static_cast<uint32_t>(run.nodes.size()));
         first_records.push_back(records);
@@ -205,5 +214,8 @@ WideTree collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool) {
     });
     return wide;
 }
+
+template WideTree<Node> collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool);
+template WideTree<FullNode> collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool);
 
 }  // namespace glint::detail

@@ -27,15 +27,16 @@ inline detail::TriangleGeometry geometryOf(const Mesh& mesh) {
 
 /// Throws std::runtime_error where there is none.
 inline detail::Hierarchy hierarchyOf(const detail::TriangleGeometry& geometry,
-                                     detail::BuildMode mode = detail::BuildMode::Quality, ThreadPool* pool = nullptr) {
-    Expected<detail::Hierarchy> hierarchy = detail::buildHierarchy(std::span(&geometry, 1), mode, pool);
+                                     detail::BuildMode mode = detail::BuildMode::Quality, ThreadPool* pool = nullptr,
+                                     detail::NodeForm form = detail::NodeForm::Packed) {
+    Expected<detail::Hierarchy> hierarchy = detail::buildHierarchy(std::span(&geometry, 1), mode, pool, form);
     if (!hierarchy) throw std::runtime_error(hierarchy.error().text());
     return std::move(*hierarchy);
 }
 
 inline detail::Hierarchy hierarchyOf(const Mesh& mesh, detail::BuildMode mode = detail::BuildMode::Quality,
-                                     ThreadPool* pool = nullptr) {
-    return hierarchyOf(geometryOf(mesh), mode, pool);
+                                     ThreadPool* pool = nullptr, detail::NodeForm form = detail::NodeForm::Packed) {
+    return hierarchyOf(geometryOf(mesh), mode, pool, form);
 }
 
 /// The same in device memory, each buffer from its begin.
@@ -61,7 +62,7 @@ inline Mesh soup(uint32_t triangles, uint64_t seed, double size = 1.0, double of
     return mesh;
 }
 
-/// A top level over instances of one hierarchy, and that hierarchy behind it. The masks are 0xff.
+/// A top level over instances of one hierarchy, of its form, and that hierarchy behind it. The masks are 0xff.
 inline std::vector<detail::Texel> instancesOf(const detail::Hierarchy& model, std::span<const Transform3x4> transforms,
                                               ThreadPool* pool = nullptr) {
     std::vector<detail::HierarchyInstance> instances(transforms.size());
@@ -72,7 +73,7 @@ inline std::vector<detail::Texel> instancesOf(const detail::Hierarchy& model, st
             instances[i].texel = texel;
         }
         Expected<detail::Hierarchy> hierarchy = detail::buildHierarchy(
-            std::span<const detail::HierarchyInstance>(instances), detail::BuildMode::Quality, pool);
+            std::span<const detail::HierarchyInstance>(instances), detail::BuildMode::Quality, pool, model.form);
         if (!hierarchy) throw std::runtime_error(hierarchy.error().text());
         return std::move(*hierarchy);
     };

@@ -28,16 +28,20 @@ public:
         EXPECT_EQ(header.nodes, hierarchy.nodes);
         EXPECT_EQ(header.records, hierarchy.records);
         EXPECT_EQ(header.first_record, hierarchy.firstRecord());
-        node(1, 1);
+        if (hierarchy.form == detail::NodeForm::Packed)
+            node<detail::Node>(1, 1);
+        else
+            node<detail::FullNode>(1, 1);
         EXPECT_EQ(visited_, hierarchy.nodes);
         EXPECT_EQ(deepest_, hierarchy.depth != 0 ? hierarchy.depth : deepest_);
-        EXPECT_LE(deepest_, detail::max_depth);
+        EXPECT_LE(deepest_, detail::maxDepth(hierarchy.form));
         EXPECT_EQ(std::count(seen_.begin(), seen_.end(), 1u), hierarchy.records) << "each record belongs to one leaf";
     }
 
     double area = 0.0;  ///< of all nodes' boxes but the root's, decoded: what the collapse keeps small
 
 private:
+    template <class Node>
     WalkBounds node(uint32_t index, uint32_t level) {
         WalkBounds bounds;
         if (index == 0 || index > hierarchy_.nodes) {
@@ -47,13 +51,13 @@ private:
         if (::testing::Test::HasFailure()) return bounds;  // one message is enough
         visited_++;
         deepest_ = std::max(deepest_, level);
-        detail::Node node;
-        std::memcpy(&node, &hierarchy_.texels[4 * size_t(index)], sizeof(node));
+        Node node;
+        std::memcpy(&node, &hierarchy_.texels[detail::texelsOf(Node::form) * size_t(index)], sizeof(node));
         EXPECT_LE(node.leaves(), node.children());
-        EXPECT_LE(node.children(), detail::node_width);
+        EXPECT_LE(node.children(), Node::width);
         for (uint32_t s = 0; s < node.children(); s++) {
             const WalkBounds inner =
-                s < node.leaves() ? record(node.record() + s) : this->node(node.child(s), level + 1);
+                s < node.leaves() ? record(node.record() + s) : this->node<Node>(node.child(s), level + 1);
             double lo[3];
             double hi[3];
             node.box(grid_, s, lo, hi);

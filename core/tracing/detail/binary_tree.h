@@ -48,7 +48,7 @@ struct BinaryNode {
 static_assert(sizeof(BinaryNode) == 32);
 
 /// Costs[i - 1]: least sum of areas of the wide nodes that hold what is below a node, if the node gives its parent at
-/// most i children.
+/// most i children. For nodes of w children at most only those below w are of use.
 struct CollapseCost {
     static constexpr uint32_t count = 7;
     float costs[count];
@@ -76,7 +76,8 @@ struct BinaryTree {
 };
 
 /// `refs` are finite, one at least; `bounds` holds them.
-BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mode, ThreadPool* pool);
+/// `width` is that of the nodes to come, CollapseCost::count + 1 at most.
+BinaryTree buildBinaryTree(Array<PrimRef> refs, const Box4& bounds, BuildMode mode, uint32_t width, ThreadPool* pool);
 
 /// Sorts the refs along a Z-order curve of 10 bits an axis and returns their codes.
 Array<uint32_t> sortByCode(Array<PrimRef>& refs, const Box4& bounds, ThreadPool* pool);

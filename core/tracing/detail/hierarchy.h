@@ -74,39 +74,51 @@ enum class BuildMode : uint8_t {
     Fast,  ///< along a Z-order curve: for structures that live for a frame
 };
 
+/// How nodes are laid out: what the traversal is compiled for (GLINT_TRACING_NODES), so one for all hierarchies of a
+/// device. docs/tracing.md has the measurements behind the choice.
+enum class NodeForm : uint8_t {
+    Packed,  ///< eight children in 64 bytes, boxes on a grid of 8 bits an axis: for CPUs
+    Full,    ///< four children in 128 bytes, boxes of floats: for GPUs
+};
+
+constexpr NodeForm nodeFormOf(bool is_cpu) { return is_cpu ? NodeForm::Packed : NodeForm::Full; }
+constexpr uint32_t texelsOf(NodeForm form) { return form == NodeForm::Packed ? 4 : 8; }
+/// Largest number of nodes on a way from the root to a leaf, by construction; the traversal's stack has its room from
+/// that.
+constexpr uint32_t maxDepth(NodeForm form) { return form == NodeForm::Packed ? 24 : 32; }
+
 constexpr float max_coordinate = 0x1p100f;  // 1.27e30
-/// Largest number of nodes on a way from the root to a leaf, by construction; so the traversal's stack holds one entry
-/// less.
-constexpr uint32_t max_depth = 24;
 /// Primitives of one hierarchy, all geometries together.
 constexpr uint64_t max_primitives = 1u << 24;
 
-/// A hierarchy as the shader reads it. In texels: 4 of a header, 4 for each node (the root is node 1: the header has
-/// the place of node 0), 3 for each primitive's record, 8 for each instance. Bit-equal for equal input, whatever the
+/// A hierarchy as the shader reads it. In texels: 4 or 8 for each node (the root is node 1: the header, of 4, has the
+/// place of node 0), 3 for each primitive's record, 8 for each instance. Bit-equal for equal input, whatever the
 /// number of threads.
 struct Hierarchy {
     enum class Kind : uint8_t { Triangles, Boxes, Instances };
 
     Array<Texel> texels;
     Kind kind = Kind::Triangles;
+    NodeForm form = NodeForm::Packed;
     uint32_t nodes = 0;        ///< 1 at least: the root of an empty hierarchy has no children
     uint32_t records = 0;      ///< active primitives; more with BuildMode::Split
     uint32_t inactive = 0;     ///< primitives that were left out
-    uint32_t depth = 0;        ///< nodes on the longest way from the root; at most max_depth
+    uint32_t depth = 0;        ///< nodes on the longest way from the root; at most maxDepth(form)
     uint64_t build_bytes = 0;  ///< largest number of bytes held during the build, the result included
 
     /// Nodes of each run have no child outside of it, but for those of run 0, which is the top: for refitting.
     std::vector<uint32_t> runs;
 
     uint64_t bytes() const { return texels.size() * sizeof(Texel); }
-    size_t firstRecord() const { return 4 * (size_t(nodes) + 1); }
+    size_t firstRecord() const { return texelsOf(form) * (size_t(nodes) + 1); }
 };
 
 /// Errors: "tracing.too_large" (more than max_primitives), "tracing.index_range" (an index names no vertex;
 /// geometry and triangle are named), "tracing.vertex_count" (no indices, and too few vertices).
 Expected<Hierarchy> buildHierarchy(std::span<const TriangleGeometry> geometries, BuildMode mode,
-                                   ThreadPool* pool = nullptr);
-Expected<Hierarchy> buildHierarchy(std::span<const BoxGeometry> geometries, BuildMode mode, ThreadPool* pool = nullptr);
+                                   ThreadPool* pool = nullptr, NodeForm form = NodeForm::Packed);
+Expected<Hierarchy> buildHierarchy(std::span<const BoxGeometry> geometries, BuildMode mode, ThreadPool* pool = nullptr,
+                                   NodeForm form = NodeForm::Packed);
 
 /// Takes the coordinates again, of the same geometries with the same indices, and keeps the tree. A primitive that was
 /// inactive stays so; one that becomes so is never hit. Errors: "tracing.refit" (other counts than at the build).

@@ -37,6 +37,6 @@ BoundBox worldBounds(const HierarchyInstance& instance);
 
 /// Instances whose transform is singular or not finite are inactive. Errors: those of buildHierarchy.
 Expected<Hierarchy> buildHierarchy(std::span<const HierarchyInstance> instances, BuildMode mode,
-                                   ThreadPool* pool = nullptr);
+                                   ThreadPool* pool = nullptr, NodeForm form = NodeForm::Packed);
 
 }  // namespace glint::detail

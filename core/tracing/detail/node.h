@@ -1,7 +1,9 @@
 #pragma once
 
-// The node: eight boxes in 64 bytes, on a grid of 8 bits an axis. Exact on the builder's side: what is encoded holds
-// what was to be held, as numbers. shaders/tracing/traversal.h decodes.
+// The nodes. Exact on the builder's side: what is encoded holds what was to be held, as numbers.
+// shaders/tracing/traversal.h decodes.
+//
+// NodeForm::Packed: eight boxes in 64 bytes, on a grid of 8 bits an axis.
 //
 //   word 0: origin x in bits 0-19, exponent x in 20-23, origin z bits 0-7 in 24-31
 //   word 1: origin y in bits 0-19, exponent y in 20-23, origin z bits 8-15 in 24-31
@@ -17,6 +19,11 @@
 // sign) the plane is at  minimum + origin * step + p * step * 2^(exponent - 2),  with the grid's minimum and step. The
 // step is a power of two, the minimum a multiple of it, and both so chosen that the sum of the first two terms has 24
 // bits at most: a float32.
+//
+// NodeForm::Full: four boxes in 128 bytes. Words 2 and 3 as above, but for the bits of z; words 0, 1 and 28-31 are 0.
+//
+//   words 4-7: low planes along x of the children 0-3, floats, as distances from the grid's minimum; 8-11 high planes;
+//   12-15 and 16-19 y; 20-23 and 24-27 z. Rounded outward. Beyond the last child: low is +infinity, high -infinity.
 
 #include <glint/tracing/detail/float4.h>
 #include <glint/tracing/detail/hierarchy.h>
@@ -31,11 +38,12 @@ struct Grid {
 /// The grid for boxes within `bounds` (finite; or empty).
 Grid makeGrid(const Box4& bounds);
 
-constexpr uint32_t node_width = 8;
 constexpr int exponent_bias = 2;
 
-struct Node {
-    uint32_t words[16];
+/// What all forms have in common.
+template <uint32_t word_count>
+struct NodeBase {
+    uint32_t words[word_count];
 
     uint32_t leaves() const { return words[2] & 15u; }
     /// Leaves included.
@@ -48,13 +56,29 @@ struct Node {
         words[2] += nodes << 8;
         words[3] += records << 8;
     }
+};
+
+struct Node : NodeBase<16> {
+    static constexpr NodeForm form = NodeForm::Packed;
+    static constexpr uint32_t width = 8;
+
+    /// Boxes of `count` children, the leaves first. An empty box, of what has become inactive, is a point of the node.
+    static Node encode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t leaves, uint32_t first_node,
+                       uint32_t first_record);
     /// The box of child s, exact.
     void box(const Grid& grid, uint32_t s, double lo[3], double hi[3]) const;
 };
-static_assert(sizeof(Node) == 64);
+static_assert(sizeof(Node) == texelsOf(Node::form) * sizeof(Texel));
 
-/// Boxes of `count` children, the leaves first. An empty box, of what has become inactive, is a point of the node.
-Node encodeNode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t leaves, uint32_t first_node,
-                uint32_t first_record);
+struct FullNode : NodeBase<32> {
+    static constexpr NodeForm form = NodeForm::Full;
+    static constexpr uint32_t width = 4;
+
+    /// As Node's; an empty box stays empty.
+    static FullNode encode(const Grid& grid, const Box4* boxes, uint32_t count, uint32_t leaves, uint32_t first_node,
+                           uint32_t first_record);
+    void box(const Grid& grid, uint32_t s, double lo[3], double hi[3]) const;
+};
+static_assert(sizeof(FullNode) == texelsOf(FullNode::form) * sizeof(Texel));
 
 }  // namespace glint::detail

@@ -1,12 +1,13 @@
 #pragma once
 
-// From the binary tree to nodes of eight children.
+// From the binary tree to wide nodes.
 
 #include <glint/tracing/detail/binary_tree.h>
 #include <glint/tracing/detail/node.h>
 
 namespace glint::detail {
 
+template <class Node>
 struct WideTree {
     /// Root first. Children are nodes 1, 2, ... as Node::child counts: one more than the place here.
     Array<Node> nodes;
@@ -16,7 +17,8 @@ struct WideTree {
     uint32_t depth = 0;
 };
 
-/// The cheapest nodes, by their surfaces; no deeper than max_depth.
-WideTree collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool);
+/// The cheapest nodes, by their surfaces; no deeper than maxDepth. The tree's costs are those for nodes of this width.
+template <class Node>
+WideTree<Node> collapse(const BinaryTree& tree, const Grid& grid, ThreadPool* pool);
 
 }  // namespace glint::detail

@@ -14,8 +14,6 @@ double powerOfTwo(int exponent) { return std::bit_cast<double>(static_cast<uint6
 // A node begins below its boxes by one unit of its scale, which is 2^12 steps at most, and a step for rounding.
 constexpr double margin_steps = 4097.0;
 
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
 /// The plane of child s in units of the node's scale: its byte, and those before it as a fraction.
 double planeOf(const uint32_t words[2], uint32_t s) {
     return 128.0 + static_cast<int32_t>(words[s / 4] << (24 - 8 * (s & 3))) * 0x1p-24;
@@ -150,13 +148,11 @@ FullNode FullNode::encode(const Grid& grid, const Box4* boxes, uint32_t count, u
     FullNode node = {};
     node.words[2] = leaves | count << 4 | (first_node - leaves) << 8;
     node.words[3] = first_record << 8;
-    for (uint32_t s = 0; s < width; s++) {
-        float lo[4] = {infinity, infinity, infinity, 0.0f};
-        float hi[4] = {-infinity, -infinity, -infinity, 0.0f};
-        if (s < count) {
-            boxes[s].lo.store(lo);
-            boxes[s].hi.store(hi);
-        }
+    for (uint32_t s = 0; s < count; s++) {
+        float lo[4];
+        float hi[4];
+        boxes[s].lo.store(lo);
+        boxes[s].hi.store(hi);
         for (uint32_t axis = 0; axis < 3; axis++) {
             node.words[4 + 8 * axis + s] = std::bit_cast<uint32_t>(differenceDown(lo[axis], grid.minimum[axis]));
             node.words[8 + 8 * axis + s] = std::bit_cast<uint32_t>(differenceUp(hi[axis], grid.minimum[axis]));

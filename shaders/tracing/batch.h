@@ -21,6 +21,13 @@
 // Steps between looking for idle lanes.
 #define GLINT_TRACING_STEPS 8
 
+layout(set = 0, binding = 1) uniform GlintBatch {
+    uint ray_count;
+    uint hierarchy;  // first texel
+    uvec2 pointer;   // to the texels, for GLINT_TRACING_ADDRESS
+};
+#define GLINT_TRACING_POINTER pointer
+
 #include <glint/tracing/memory.h>
 #include <glint/tracing/ray_query.h>
 #include <glint/tracing/traversal.h>
@@ -53,10 +60,6 @@ struct GlintHit {
     uint unused;
 };
 
-layout(set = 0, binding = 1) uniform GlintBatch {
-    uint ray_count;
-    uint hierarchy;  // first texel
-};
 layout(set = 0, binding = 2) readonly buffer GlintRays { GlintRay rays[]; };
 layout(set = 0, binding = 3) writeonly buffer GlintHits { GlintHit hits[]; };
 
@@ -81,7 +84,7 @@ void glintStep(inout GlintWay way, GlintSpace space, uint instance, float t_min,
     if (glintAtNode(way)) glintEnterNode(way, 0u, space, t_min, closest.t);
     if (glintAtLeaf(way)) {
         GlintTriangleHit hit;
-        const bool met = glintTriangle(space, glintChildRecord(way.header, way.slot), hit);
+        const bool met = glintTriangle(space, glintRecord(way), hit);
         const bool wins = instance == closest.instance ? glintIsBefore(hit, closest.hit) : instance < closest.instance;
         if (met && hit.t > t_min && (hit.t < closest.t || closest.found && hit.t == closest.t && wins))
             closest = GlintClosest(hit.t, true, hit, instance);
@@ -118,7 +121,7 @@ void main() {
     GlintWay way;
     glintEnd(way);
     for (;;) {
-        const bool idle = way.slot == GLINT_TRACING_NONE;
+        const bool idle = !glintUnderway(way);
         const uvec4 idles = subgroupBallot(idle);
         const uint idle_count = subgroupBallotBitCount(idles);
         const bool all_idle = idle_count == gl_SubgroupSize;
@@ -152,14 +155,14 @@ void main() {
     GlintClosest closest;
     GlintWay way = glintBeginRay(ray, closest);
 #if GLINT_TRACING_LEVELS == 1
-    while (way.slot != GLINT_TRACING_NONE) glintStep(way, space, 0u, t_min, closest);
+    while (glintUnderway(way)) glintStep(way, space, 0u, t_min, closest);
 #else
-    while (way.slot != GLINT_TRACING_NONE) {
+    while (glintUnderway(way)) {
         // All lanes go on to an instance, and then through their instances together, so that what is the same for all
         // of an instance's nodes stays where it is.
         GlintInstance instance;
         bool inside = false;
-        while (way.slot != GLINT_TRACING_NONE && !inside) {
+        while (glintUnderway(way) && !inside) {
             if (glintAtNode(way)) glintEnterNode(way, 0u, space, t_min, closest.t);
             if (glintAtLeaf(way)) {
                 instance = glintInstanceAt(space, way);
@@ -171,7 +174,7 @@ void main() {
             const GlintSpace below = glintInstanceSpace(instance, ray.origin, ray.direction);
             glintPush(way, 0u);
             glintBegin(way);
-            while (way.slot != GLINT_TRACING_NONE) glintStep(way, below, instance.index, t_min, closest);
+            while (glintUnderway(way)) glintStep(way, below, instance.index, t_min, closest);
             glintLeave(way, 0u, space.base);
         }
     }

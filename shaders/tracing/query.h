@@ -106,7 +106,7 @@ bool glintQueryIsBefore(GlintIntersection a, GlintIntersection b) {
 
 // True if the leaf is a candidate that the caller has to decide on.
 bool glintQueryEnterLeaf(inout GlintQuery query, GlintSpace space) {
-    const uint record = glintChildRecord(query.way.header, query.way.slot);
+    const uint record = glintRecord(query.way);
     GlintIntersection next;
     next.instance = query.instance.index;
     if (query.instance.kind == GLINT_KIND_BOXES) {
@@ -154,16 +154,16 @@ bool glintQueryEnterLeaf(inout GlintQuery query, GlintSpace space) {
 // Goes on to the next candidate that the caller has to decide on. False when there is none.
 bool glintQueryProceed(inout GlintQuery query) {
     bool asks = false;
-    while (!asks && (query.way.slot != GLINT_TRACING_NONE || query.inside)) {
+    while (!asks && (glintUnderway(query.way) || query.inside)) {
         // All lanes go on to an instance, and then through their instances together, so that what is the same for all
         // of an instance's nodes stays where it is.
-        while (query.way.slot != GLINT_TRACING_NONE && !query.inside) {
+        while (glintUnderway(query.way) && !query.inside) {
             if (glintAtNode(query.way))
                 glintEnterNode(query.way, query.number, query.top, query.t_min, query.committed.t);
             if (glintAtLeaf(query.way)) glintQueryEnterInstance(query);
         }
         const GlintSpace space = query.space;
-        while (query.way.slot != GLINT_TRACING_NONE && !asks) {
+        while (glintUnderway(query.way) && !asks) {
             if (glintAtNode(query.way)) glintEnterNode(query.way, query.number, space, query.t_min, query.committed.t);
             if (glintAtLeaf(query.way)) asks = glintQueryEnterLeaf(query, space);
         }

@@ -12,17 +12,16 @@
 #ifndef GLINT_TRACING_QUERIES
 #define GLINT_TRACING_QUERIES 1
 #endif
-// Entries of the stack: a hierarchy has 24 levels of nodes at most, and the last one pushes nothing; but the instances
-// beside the one that the ray is within wait too.
-#define GLINT_TRACING_STACK (24 * GLINT_TRACING_LEVELS - 1)
+// The form of the hierarchies' nodes: NodeForm of core/tracing/detail/hierarchy.h.
+#define GLINT_NODES_PACKED 0
+#define GLINT_NODES_FULL 1
+#ifndef GLINT_TRACING_NODES
+#define GLINT_TRACING_NODES GLINT_NODES_PACKED
+#endif
 
 // Of a hierarchy, as in core/tracing/detail/hierarchy.h.
 const uint GLINT_KIND_TRIANGLES = 0u;
 const uint GLINT_KIND_BOXES = 1u;
-
-// The slot that ends a list of children, and a list of nothing else.
-#define GLINT_TRACING_NONE 15u
-#define GLINT_TRACING_EMPTY 0xffffffffu
 
 // How far planes are moved apart, in the largest distance of a coordinate from the ray's origin: 2^-19. Less is not
 // safe; it is a macro so that what it costs can be measured.
@@ -106,84 +105,6 @@ GlintSpace glintSpace(uint base, vec3 origin, vec3 direction) {
     return space;
 }
 
-// A node's children that the ray meets between t_min >= 0 and t_max, nearest first: their slots, four bits each, ended
-// by NONE. `header` is the node's words 2 and 3.
-#define GLINT_PLANE(word, shift) float(int((word) << (24 - shift)))
-#define GLINT_CHILD(s, nx, fx, ny, fy, nz, fz, shift)                                                        \
-    int key##s;                                                                                              \
-    {                                                                                                        \
-        const int tx0 = floatBitsToInt(GLINT_PLANE(nx, shift) * scale.x + near.x);                           \
-        const int ty0 = floatBitsToInt(GLINT_PLANE(ny, shift) * scale.y + near.y);                           \
-        const int tz0 = floatBitsToInt(GLINT_PLANE(nz, shift) * scale.z + near.z);                           \
-        const int tx1 = floatBitsToInt(GLINT_PLANE(fx, shift) * scale.x + far.x);                            \
-        const int ty1 = floatBitsToInt(GLINT_PLANE(fy, shift) * scale.y + far.y);                            \
-        const int tz1 = floatBitsToInt(GLINT_PLANE(fz, shift) * scale.z + far.z);                            \
-        const int t0 = max(max(tx0, ty0), max(tz0, first));                                                  \
-        const int t1 = min(min(tx1, ty1), min(tz1, last));                                                   \
-        key##s = t0 <= t1 && s < children ? (t0 & ~15) | s : 0x7fffffff;                                     \
-    }
-#define GLINT_SORT(a, b)                          \
-    {                                             \
-        const int smaller = min(key##a, key##b);  \
-        key##b = max(key##a, key##b);             \
-        key##a = smaller;                         \
-    }
-
-uint glintNode(GlintSpace space, uint node, float t_min, float t_max, out uvec2 header) {
-    const uint texel = space.base + 4u * node;
-    const uvec4 head = GLINT_TRACING_LOAD(texel);
-    const uvec4 planes_x = GLINT_TRACING_LOAD(texel + 1u);
-    const uvec4 planes_y = GLINT_TRACING_LOAD(texel + 2u);
-    const uvec4 planes_z = GLINT_TRACING_LOAD(texel + 3u);
-    header = head.zw;
-
-    const uvec3 exponents = uvec3(head.x << 3, head.y << 3, head.w << 19) & 0x07800000u;
-    const uvec3 origin = uvec3(head.xy & 0xfffffu, head.x >> 24 | head.y >> 24 << 8 | (head.w & 15u) << 16);
-    const vec3 unit = uintBitsToFloat(exponents + space.scale_bits);
-    const vec3 corner = (vec3(origin) * space.step + space.to_grid + unit * 128.0) * space.inverse;
-    const vec3 scale = unit * space.inverse * 5.9604645e-8;  // 2^-24
-    const vec3 near = corner - space.margin;
-    const vec3 far = corner + space.margin;
-
-    const bvec3 back = lessThan(space.inverse, vec3(0.0));
-    const uvec2 near_x = back.x ? planes_x.zw : planes_x.xy;
-    const uvec2 far_x = back.x ? planes_x.xy : planes_x.zw;
-    const uvec2 near_y = back.y ? planes_y.zw : planes_y.xy;
-    const uvec2 far_y = back.y ? planes_y.xy : planes_y.zw;
-    const uvec2 near_z = back.z ? planes_z.zw : planes_z.xy;
-    const uvec2 far_z = back.z ? planes_z.xy : planes_z.zw;
-
-    // Floats that are not negative are ordered as their bits are; a negative far end is below any near one, as it should
-    // be, and a negative near one below t_min.
-    const int first = floatBitsToInt(t_min);
-    const int last = floatBitsToInt(t_max);
-    const int children = int(head.z >> 4 & 15u);
-    GLINT_CHILD(0, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 0)
-    GLINT_CHILD(1, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 8)
-    GLINT_CHILD(2, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 16)
-    GLINT_CHILD(3, near_x.x, far_x.x, near_y.x, far_y.x, near_z.x, far_z.x, 24)
-    GLINT_CHILD(4, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 0)
-    GLINT_CHILD(5, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 8)
-    GLINT_CHILD(6, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 16)
-    GLINT_CHILD(7, near_x.y, far_x.y, near_y.y, far_y.y, near_z.y, far_z.y, 24)
-
-    GLINT_SORT(0, 2) GLINT_SORT(1, 3) GLINT_SORT(4, 6) GLINT_SORT(5, 7)
-    GLINT_SORT(0, 4) GLINT_SORT(1, 5) GLINT_SORT(2, 6) GLINT_SORT(3, 7)
-    GLINT_SORT(0, 1) GLINT_SORT(2, 3) GLINT_SORT(4, 5) GLINT_SORT(6, 7)
-    GLINT_SORT(2, 4) GLINT_SORT(3, 5)
-    GLINT_SORT(1, 4) GLINT_SORT(3, 6)
-    GLINT_SORT(1, 2) GLINT_SORT(3, 4) GLINT_SORT(5, 6)
-
-    return uint(key0 & 15 | (key1 & 15) << 4 | (key2 & 15) << 8 | (key3 & 15) << 12 | (key4 & 15) << 16 |
-                (key5 & 15) << 20 | (key6 & 15) << 24 | key7 << 28);
-}
-
-uint glintFirst(uint list) { return list & 15u; }
-uint glintRest(uint list) { return list >> 4 | 0xf0000000u; }
-bool glintIsLeaf(uvec2 header, uint slot) { return slot < (header.x & 15u); }
-uint glintChildNode(uvec2 header, uint slot) { return ((header.x >> 8) + slot) & 0xffffffu; }
-uint glintChildRecord(uvec2 header, uint slot) { return (header.y >> 8) + slot; }
-
 // What is left of a product after rounding, exactly: Dekker's two-product.
 float glintProductError(float a, float b, float product) {
     precise float split_a = 4097.0 * a;
@@ -258,69 +179,27 @@ bool glintIsBefore(GlintTriangleHit a, GlintTriangleHit b) {
     return geometry_a < geometry_b || (geometry_a == geometry_b && a.primitive < b.primitive);
 }
 
-// The way of a ray through a hierarchy. What waits for it is on the stack, beside the structure: an array in it would be
-// copied at every call.
-struct GlintWay {
-    uint node;     // whose children are in `list`
-    uvec2 header;  // its words 2 and 3
-    uint list;     // what is left of them after `slot`
-    uint slot;     // the child to go to; NONE when there is none left
-    uint stacked;  // entries of the stack
-    uint bottom;   // and those of the level above
-};
-
-uint glint_stack_nodes[GLINT_TRACING_QUERIES][GLINT_TRACING_STACK];
-uint glint_stack_lists[GLINT_TRACING_QUERIES][GLINT_TRACING_STACK];
-
-// To the root, above what is on the stack.
-void glintBegin(inout GlintWay way) {
-    way.node = 0u;
-    way.header = uvec2(0x100u, 0u);  // child 0 is node 1
-    way.list = GLINT_TRACING_EMPTY;
-    way.slot = 0u;
-    way.bottom = way.stacked;
-}
-
-void glintEnd(out GlintWay way) { way = GlintWay(0u, uvec2(0u), GLINT_TRACING_EMPTY, GLINT_TRACING_NONE, 0u, 0u); }
-
-bool glintAtNode(GlintWay way) { return way.slot != GLINT_TRACING_NONE && !glintIsLeaf(way.header, way.slot); }
-bool glintAtLeaf(GlintWay way) { return way.slot != GLINT_TRACING_NONE && glintIsLeaf(way.header, way.slot); }
-
-// To the next child: of this node, or of the last one that has children left. (Keeping on the stack where these begin,
-// and passing over what lies beyond the closest hit, takes more time than it saves: docs/tracing.md.)
-void glintNext(inout GlintWay way, uint number, uint base) {
-    if (way.list == GLINT_TRACING_EMPTY && way.stacked > way.bottom) {
-        way.stacked--;
-        way.list = glint_stack_lists[number][way.stacked];
-        way.node = glint_stack_nodes[number][way.stacked];
-        way.header = GLINT_TRACING_LOAD(base + 4u * way.node).zw;
-    }
-    way.slot = glintFirst(way.list);
-    way.list = glintRest(way.list);
-}
-
-// What is left of this node's children waits on the stack.
-void glintPush(inout GlintWay way, uint number) {
-    if (way.list == GLINT_TRACING_EMPTY) return;
-    glint_stack_nodes[number][way.stacked] = way.node;
-    glint_stack_lists[number][way.stacked] = way.list;
-    way.stacked++;
-}
-
-void glintEnterNode(inout GlintWay way, uint number, GlintSpace space, float t_min, float t_max) {
-    glintPush(way, number);
-    way.node = glintChildNode(way.header, way.slot);
-    way.list = glintNode(space, way.node, t_min, t_max, way.header);
-    glintNext(way, number, space.base);
-}
-
-// From the root of an instance's hierarchy, with nothing left there, back to the level above, whose texels begin at
-// `base`.
-void glintLeave(inout GlintWay way, uint number, uint base) {
-    way.list = GLINT_TRACING_EMPTY;
-    way.bottom = 0u;
-    glintNext(way, number, base);
-}
+// The way of a ray through a hierarchy, GlintWay. What waits for it is on a stack beside the structure, that of the
+// ray's `number`: an array in it would be copied at every call. `base` is the hierarchy's first texel.
+//
+//   void glintBegin(inout GlintWay way)     to the root, above what is on the stack
+//   void glintEnd(out GlintWay way)         to nowhere, with nothing on the stack
+//   bool glintUnderway(GlintWay way)        not at the end of this level
+//   bool glintAtNode(GlintWay way), glintAtLeaf(GlintWay way)
+//   uint glintRecord(GlintWay way)          the leaf's
+//   void glintEnterNode(inout GlintWay way, uint number, GlintSpace space, float t_min, float t_max)
+//                                           to the nearest child that the ray meets between t_min >= 0 and t_max
+//   void glintNext(inout GlintWay way, uint number, uint base)
+//                                           from a leaf to what is next
+//   void glintPush(inout GlintWay way, uint number)
+//                                           before glintBegin at an instance: what is left at this level waits
+//   void glintLeave(inout GlintWay way, uint number, uint base)
+//                                           from the end of an instance's hierarchy to what is next at the level above
+#if GLINT_TRACING_NODES == GLINT_NODES_PACKED
+#include <glint/tracing/packed_nodes.h>
+#else
+#include <glint/tracing/full_nodes.h>
+#endif
 
 // Rows of a 3x4 matrix that begins at a texel.
 mat4x3 glintMatrix(uint texel) {
@@ -366,7 +245,7 @@ GlintInstance glintInstance(uint top, uint index) {
 
 // That of a top level's leaf.
 GlintInstance glintInstanceAt(GlintSpace top, GlintWay way) {
-    const uint record = top.records + 3u * glintChildRecord(way.header, way.slot);
+    const uint record = top.records + 3u * glintRecord(way);
     return glintInstance(top.base, GLINT_TRACING_LOAD(record + 2u).y);
 }
 

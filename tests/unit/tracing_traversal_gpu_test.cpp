@@ -21,12 +21,6 @@ namespace {
 
 using namespace glint::detail;
 
-Hierarchy buildMesh(const Mesh& mesh, BuildMode mode = BuildMode::Quality, bool opaque = true) {
-    TriangleGeometry geometry = geometryOf(mesh);
-    geometry.opaque = opaque;
-    return hierarchyOf(geometry, mode);
-}
-
 /// As the kernel of batch.h writes it.
 struct BatchHit {
     RayHit hit;
@@ -40,8 +34,19 @@ Ray rayTo(const Vector3d& origin, const Vector3d& target) {
     return ray;
 }
 
-class TracingTraversal : public DeviceTest {
+/// Every test runs with every form of nodes.
+class TracingTraversal : public DeviceTest, public ::testing::WithParamInterface<NodeForm> {
 protected:
+    Hierarchy buildMesh(const Mesh& mesh, BuildMode mode = BuildMode::Quality, bool opaque = true) const {
+        TriangleGeometry geometry = geometryOf(mesh);
+        geometry.opaque = opaque;
+        return hierarchyOf(geometry, mode, nullptr, GetParam());
+    }
+
+    std::string macros(uint32_t memory = 0) const {
+        return fmt::format("GLINT_TRACING_MEMORY={};GLINT_TRACING_NODES={};", memory, static_cast<int>(GetParam()));
+    }
+
     std::vector<RayHit> trace(const Hierarchy& hierarchy, const std::vector<Ray>& rays, bool refill,
                               uint32_t memory = 0) {
         std::vector<RayHit> hits;
@@ -54,25 +59,27 @@ protected:
     std::vector<BatchHit> trace(std::span<const Texel> hierarchies, const std::vector<Ray>& rays, uint32_t levels,
                                 bool refill, uint32_t memory = 0) {
         Kernel kernel = device.createKernel();
-        kernel.createShaderGLSL(
-            "#include <glint/tracing/batch.h>\n",
-            fmt::format("GLINT_TRACING_MEMORY={};GLINT_TRACING_LEVELS={};GLINT_TRACING_REFILL={};GLINT_TRACING_RAYS=4",
-                        memory, levels, refill ? 1 : 0));
+        kernel.createShaderGLSL("#include <glint/tracing/batch.h>\n",
+                                macros(memory) +
+                                    fmt::format("GLINT_TRACING_LEVELS={};GLINT_TRACING_REFILL={};GLINT_TRACING_RAYS=4",
+                                                levels, refill ? 1 : 0));
         EXPECT_TRUE(kernel.create()) << kernel.error().text();
-        const Buffer texels = device.createBuffer(Buffer::FlagTexel | Buffer::FlagStorage, hierarchies);
+        Buffer::Flags flags = Buffer::FlagTexel | Buffer::FlagStorage;
+        if (memory == 2) flags |= Buffer::FlagAddress;
+        const Buffer texels = device.createBuffer(flags, hierarchies);
         const Buffer ray_buffer = device.createBuffer(Buffer::FlagStorage, std::span(rays));
         const Buffer hit_buffer = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit));
         device.clearBuffer(hit_buffer, 0x12345678u);
         const auto count = static_cast<uint32_t>(rays.size());
         Compute compute = device.createCompute();
         compute.setKernel(kernel);
-        compute.setUniform(0, std::array<uint32_t, 4>{count, 0, 0, 0});
-        if (memory == 0) {
-            compute.setTexelBuffer(0, texels, FormatRGBAu32);
-            compute.setStorageBuffers(0, {ray_buffer, hit_buffer});
-        } else {
-            compute.setStorageBuffers(0, {texels, ray_buffer, hit_buffer});
-        }
+        const uint64_t address = texels.getAddress();
+        compute.setUniform(
+            0, std::array<uint32_t, 4>{count, 0, static_cast<uint32_t>(address), static_cast<uint32_t>(address >> 32)});
+        if (memory == 0) compute.setTexelBuffer(0, texels, FormatRGBAu32);
+        if (memory == 1) compute.setStorageBuffer(0, texels);
+        if (memory == 2) compute.useBuffer(texels, false);
+        compute.setStorageBuffers(memory == 1 ? 1 : 0, {ray_buffer, hit_buffer});
         compute.dispatch(refill ? (count + 3) / 4 : count);
         const Status status = device.submit(compute);
         EXPECT_TRUE(status) << status.error().text();
@@ -151,7 +158,7 @@ Mesh needles() {
     return mesh;
 }
 
-TEST_F(TracingTraversal, FindsWhatFloat64Finds) {
+TEST_P(TracingTraversal, FindsWhatFloat64Finds) {
     const Mesh torus = createTorus(1.0f, 0.4f, 24, 12);
     const std::pair<const char*, Mesh> cases[] = {
         {"torus", torus},
@@ -170,13 +177,14 @@ TEST_F(TracingTraversal, FindsWhatFloat64Finds) {
         // The other forms do the same arithmetic, so they give the same bits; and so does a second run.
         EXPECT_EQ(trace(hierarchy, rays, true), hits);
         EXPECT_EQ(trace(hierarchy, rays, false, 1), hits);
+        if (device.getFeatures().bufferAddress) { EXPECT_EQ(trace(hierarchy, rays, false, 2), hits); }
         EXPECT_EQ(trace(hierarchy, rays, false), hits);
         EXPECT_EQ(trace(buildMesh(mesh, BuildMode::Fast), rays, true), hits);
         EXPECT_EQ(trace(buildMesh(mesh, BuildMode::Split), rays, false), hits);
     }
 }
 
-TEST_F(TracingTraversal, LetsNothingThroughClosedMeshes) {
+TEST_P(TracingTraversal, LetsNothingThroughClosedMeshes) {
     const std::vector<ClosedMesh> meshes = closedMeshes();
     for (const ClosedMesh& mesh : meshes) {
         SCOPED_TRACE(mesh.name);
@@ -201,7 +209,7 @@ TEST_F(TracingTraversal, LetsNothingThroughClosedMeshes) {
     EXPECT_GT(leaks.beyond, 100u);
 }
 
-TEST_F(TracingTraversal, KeepsToTheIntervalAndTheOrderOfTies) {
+TEST_P(TracingTraversal, KeepsToTheIntervalAndTheOrderOfTies) {
     // Three copies of a triangle at z = 2 and one at z = 4.
     Mesh mesh;
     for (const float z : {4.0f, 2.0f, 2.0f, 2.0f}) {
@@ -240,10 +248,11 @@ TEST_F(TracingTraversal, KeepsToTheIntervalAndTheOrderOfTies) {
 }
 
 /// A top level, and the models behind it. The instances' texels are the models' numbers.
-std::vector<Texel> sceneOf(std::vector<HierarchyInstance> instances, std::span<const Hierarchy> models) {
+std::vector<Texel> sceneOf(std::vector<HierarchyInstance> instances, std::span<const Hierarchy> models, NodeForm form) {
     for (HierarchyInstance& instance : instances) instance.bounds = boundsOf(models[instance.texel]);
     const auto top = [&] {
-        return std::move(*buildHierarchy(std::span<const HierarchyInstance>(instances), BuildMode::Quality));
+        return std::move(
+            *buildHierarchy(std::span<const HierarchyInstance>(instances), BuildMode::Quality, nullptr, form));
     };
     // Its size does not depend on where the models are.
     size_t end = top().texels.size();
@@ -395,7 +404,7 @@ std::string describe(size_t ray, const QueryHit& hit) {
 
 bool near(const Vector3f& a, const Vector3f& b, float bound) { return glm::length(a - b) <= bound; }
 
-TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
+TEST_P(TracingTraversal, QueriesAsTheDriverDoes) {
     GLINT_NEED_FEATURE(FeatureComputeTracing);
     const Mesh meshes[] = {createTorus(0.4f, 0.15f, 16, 8), createSphere(0.5f, 1)};
     const float box[6] = {-0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f};
@@ -418,7 +427,8 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
     boxes.boxes = reinterpret_cast<const std::byte*>(box);
     boxes.count = 1;
     boxes.opaque = false;
-    models.push_back(std::move(*buildHierarchy(std::span<const BoxGeometry>(&boxes, 1), BuildMode::Quality)));
+    models.push_back(
+        std::move(*buildHierarchy(std::span<const BoxGeometry>(&boxes, 1), BuildMode::Quality, nullptr, GetParam())));
     kept.push_back(device.createBuffer(Buffer::FlagTracing, std::span(box)));
     Tracing box_tracing = device.createTracing();
     box_tracing.addBoundBuffer(1, 24, kept.back());
@@ -457,13 +467,13 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
     Tracing driver_scene = device.createTracing(driver_instances);
     ASSERT_TRUE(device.buildTracings({driver_models[0], driver_models[1], driver_models[2], driver_scene}));
 
-    const std::vector<Texel> all = sceneOf(instances, models);
+    const std::vector<Texel> all = sceneOf(instances, models, GetParam());
     const Buffer texels = device.createBuffer(Buffer::FlagTexel, std::span(all));
 
     Kernel kernels[2];
     for (int i = 0; i < 2; i++) {
         kernels[i] = device.createKernel();
-        kernels[i].createShaderGLSL(query_source, i == 1 ? "DRIVER=1" : "DRIVER=0;GLINT_TRACING_MEMORY=0");
+        kernels[i].createShaderGLSL(query_source, i == 1 ? "DRIVER=1" : "DRIVER=0;" + macros());
         ASSERT_TRUE(kernels[i].create()) << kernels[i].error().text();
     }
     std::vector<Ray> rays;
@@ -535,7 +545,7 @@ TEST_F(TracingTraversal, QueriesAsTheDriverDoes) {
     }
 }
 
-TEST_F(TracingTraversal, TracesInstancesInBatches) {
+TEST_P(TracingTraversal, TracesInstancesInBatches) {
     const float box[6] = {-0.5f, -0.5f, -0.5f, 0.5f, 0.5f, 0.5f};
     BoxGeometry boxes;
     boxes.boxes = reinterpret_cast<const std::byte*>(box);
@@ -543,7 +553,8 @@ TEST_F(TracingTraversal, TracesInstancesInBatches) {
     std::vector<Hierarchy> models;
     models.push_back(buildMesh(createTorus(0.4f, 0.15f, 16, 8)));
     models.push_back(buildMesh(createSphere(0.5f, 1)));
-    models.push_back(std::move(*buildHierarchy(std::span<const BoxGeometry>(&boxes, 1), BuildMode::Quality)));
+    models.push_back(
+        std::move(*buildHierarchy(std::span<const BoxGeometry>(&boxes, 1), BuildMode::Quality, nullptr, GetParam())));
 
     // Turned, stretched, mirrored and flipped; some cannot be seen, some are twice in the same place.
     Random random(24);
@@ -560,7 +571,7 @@ TEST_F(TracingTraversal, TracesInstancesInBatches) {
         instances.push_back(instance);
         if (i % 9 == 0) instances.push_back(instance);
     }
-    const std::vector<Texel> scene = sceneOf(instances, models);
+    const std::vector<Texel> scene = sceneOf(instances, models, GetParam());
     std::vector<Ray> rays;
     for (uint32_t i = 0; i < 3001; i++) {
         Ray ray = rayTo(4.0 * random.direction(), 2.0 * random.direction());
@@ -571,7 +582,7 @@ TEST_F(TracingTraversal, TracesInstancesInBatches) {
 
     // What a query finds that sees all masks and takes all triangles.
     Kernel kernel = device.createKernel();
-    kernel.createShaderGLSL(query_source, "DRIVER=0;GLINT_TRACING_MEMORY=0");
+    kernel.createShaderGLSL(query_source, "DRIVER=0;" + macros());
     ASSERT_TRUE(kernel.create()) << kernel.error().text();
     const Buffer texels = device.createBuffer(Buffer::FlagTexel, std::span(scene));
     const Buffer ray_buffer = device.createBuffer(Buffer::FlagStorage, std::span(rays));
@@ -608,8 +619,11 @@ TEST_F(TracingTraversal, TracesInstancesInBatches) {
     }
     EXPECT_GT(met, rays.size() / 4);
     EXPECT_GT(twice, 20u);
-    EXPECT_FALSE(trace(sceneOf({}, {}), {rays[0]}, 2, false)[0].hit.isHit());
+    EXPECT_FALSE(trace(sceneOf({}, {}, GetParam()), {rays[0]}, 2, false)[0].hit.isHit());
 }
+
+INSTANTIATE_TEST_SUITE_P(Nodes, TracingTraversal, ::testing::Values(NodeForm::Packed, NodeForm::Full),
+                         [](const auto& each) { return each.param == NodeForm::Packed ? "Packed" : "Full"; });
 
 }  // namespace
 

@@ -20,10 +20,10 @@
 // step is a power of two, the minimum a multiple of it, and both so chosen that the sum of the first two terms has 24
 // bits at most: a float32.
 //
-// NodeForm::Full: four boxes in 128 bytes. Words 2 and 3 as above, but for the bits of z; words 0, 1 and 28-31 are 0.
+// NodeForm::Full: four boxes in 128 bytes. Words 2 and 3 as above, but for the bits of z; what is not named is 0.
 //
 //   words 4-7: low planes along x of the children 0-3, floats, as distances from the grid's minimum; 8-11 high planes;
-//   12-15 and 16-19 y; 20-23 and 24-27 z. Rounded outward. Beyond the last child: low is +infinity, high -infinity.
+//   12-15 and 16-19 y; 20-23 and 24-27 z. Rounded outward.
 
 #include <glint/tracing/detail/float4.h>
 #include <glint/tracing/detail/hierarchy.h>

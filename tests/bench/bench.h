@@ -70,6 +70,7 @@ Benchmark tracingSoftwareBenchmark();
 Benchmark tracingBuildBenchmark();
 Benchmark tracingDeviceBenchmark();
 Benchmark tracingDriverBenchmark();
+Benchmark tracingGpuBenchmark();
 Benchmark castBenchmark();
 Benchmark castMemoryBenchmark();
 Benchmark tracingLeaksBenchmark();

@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
         shaderCompileBenchmark(),    dispatchBenchmark(),      drawBenchmark(),         warmFrameBenchmark(),
         tracingFrameBenchmark(),     startupBenchmark(),       memoryBenchmark(),       tracingSoftwareBenchmark(),
         tracingBuildBenchmark(),     tracingDeviceBenchmark(), tracingLeaksBenchmark(), tracingDriverBenchmark(),
-        tracingTradeoffsBenchmark(), castBenchmark(),          castMemoryBenchmark()};
+        tracingTradeoffsBenchmark(), tracingGpuBenchmark(),    castBenchmark(),         castMemoryBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

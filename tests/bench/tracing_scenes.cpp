@@ -9,6 +9,7 @@
 
 #include <atomic>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <thread>
 
@@ -16,7 +17,6 @@ namespace glint::bench {
 
 namespace {
 
-constexpr uint32_t size = 1024;
 constexpr const char* bunny_path = "/usr/share/glmark2/models/bunny.obj";
 
 void append(Mesh& mesh, const Mesh& other) {
@@ -36,8 +36,9 @@ Mesh bumpyTorus(uint32_t segments) {
     return mesh;
 }
 
-Mesh bunny() {
-    Mesh mesh = *check(Mesh::load(bunny_path));
+/// A file's mesh, in the middle and 2.4 units long.
+Mesh model(const std::filesystem::path& path) {
+    Mesh mesh = *check(Mesh::load(path));
     mesh.normals.clear();
     mesh.texcoords.clear();
     mesh.parts.clear();
@@ -54,15 +55,16 @@ uint32_t evenBits(uint32_t x) {
     return result;
 }
 
-std::vector<Ray> cameraRays(const Vector3f& eye, const Vector3f& target, const Vector3f& up_axis, float degrees) {
+std::vector<Ray> cameraRays(const Vector3f& eye, const Vector3f& target, const Vector3f& up_axis, float degrees,
+                            uint32_t size) {
     const Vector3f forward = glm::normalize(target - eye);
     const Vector3f right = glm::normalize(glm::cross(forward, up_axis));
     const Vector3f up = glm::cross(right, forward);
     const float extent = std::tan(radians(degrees) / 2);
     std::vector<Ray> rays(size_t(size) * size);
     for (uint32_t i = 0; i < rays.size(); i++) {
-        const float x = (static_cast<float>(evenBits(i)) + 0.5f) * (2.0f / size) - 1.0f;
-        const float y = (static_cast<float>(evenBits(i >> 1)) + 0.5f) * (2.0f / size) - 1.0f;
+        const float x = (static_cast<float>(evenBits(i)) + 0.5f) * (2.0f / static_cast<float>(size)) - 1.0f;
+        const float y = (static_cast<float>(evenBits(i >> 1)) + 0.5f) * (2.0f / static_cast<float>(size)) - 1.0f;
         rays[i].origin = eye;
         rays[i].direction = glm::normalize(forward + right * (x * extent) - up * (y * extent));
     }
@@ -74,7 +76,8 @@ std::vector<Ray> bounceRays(const TracingScene& scene) {
     const std::vector<Ray>& rays = scene.camera;
     std::vector<RayHit> hits(rays.size());
     std::vector<uint32_t> instances(rays.size());
-    test::EmbreeScene(mesh, test::EmbreeMode::Robust, scene.instances).cast(rays, hits, 2, instances);
+    test::EmbreeScene(mesh, test::EmbreeMode::Robust, scene.instances)
+        .cast(rays, hits, std::thread::hardware_concurrency(), instances);
     test::Random random(1);
     std::vector<Ray> result;
     result.reserve(rays.size());
@@ -96,18 +99,26 @@ std::vector<Ray> bounceRays(const TracingScene& scene) {
 
 }  // namespace
 
-TracingScene makeTracingScene(const std::string& name) {
+std::filesystem::path dragonPath() {
+    const char* path = std::getenv("GLINT_DRAGON");
+    return path ? path : "";
+}
+
+TracingScene makeTracingScene(const std::string& name, uint32_t size) {
     TracingScene scene;
     scene.name = name;
     if (name == "instances") {
         const InstancedScene places = *check(InstancedScene::load({}, false));
         scene.mesh = places.mesh();
         scene.instances = places.transforms(0.0f);
-        scene.camera = cameraRays(places.camera(0.0f, 1.0f).position(), places.target(), Vector3f(0, 0, 1), 60.0f);
+        scene.camera =
+            cameraRays(places.camera(0.0f, 1.0f).position(), places.target(), Vector3f(0, 0, 1), 60.0f, size);
     } else {
-        scene.mesh = name == "bunny" ? bunny() : bumpyTorus(name == "1m" ? 500 : 158);
+        const bool is_file = name == "bunny" || name == "dragon";
+        scene.mesh =
+            is_file ? model(name == "bunny" ? bunny_path : dragonPath()) : bumpyTorus(name == "1m" ? 500 : 158);
         append(scene.mesh, createBox(Vector3f(6.0f)));
-        scene.camera = cameraRays(Vector3f(0.3f, 1.9f, 2.3f), Vector3f(0.0f), Vector3f(0, 1, 0), 55.0f);
+        scene.camera = cameraRays(Vector3f(0.3f, 1.9f, 2.3f), Vector3f(0.0f), Vector3f(0, 1, 0), 55.0f, size);
     }
     scene.bounce = bounceRays(scene);
     if (scene.instances.empty() && scene.bounce.size() != scene.camera.size())

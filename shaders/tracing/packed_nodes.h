@@ -1,5 +1,6 @@
-// Nodes of eight children on a grid of 8 bits an axis (core/tracing/detail/node.h, NodeForm::Packed), and the way of a ray
-// through them, which keeps the children that are left of a node in a list. Included by traversal.h.
+// Nodes of eight children on a grid of 8 bits an axis, the form for CPUs (core/tracing/detail/node.h,
+// NodeForm::Packed), and the way of a ray through them, which keeps what is left of a node's children in a list.
+// Included by traversal.h.
 #pragma once
 
 #define GLINT_NODE_TEXELS 4u

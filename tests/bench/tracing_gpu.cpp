@@ -88,7 +88,7 @@ double insideBy(const TracingScene& scene, const BatchHit& hit, const Ray& ray) 
     for (size_t c = 0; c < 3; c++) {
         Vector3d corner(scene.mesh.positions[scene.mesh.indices[3 * size_t(hit.hit.primitive) + c]]);
         if (!scene.instances.empty()) {
-            const auto& m = scene.instances[hit.instance].rows;
+            const auto& m = scene.instances[hit.hit.instance].rows;
             const Vector3d object = corner;
             for (int row = 0; row < 3; row++) {
                 const float* r = &m[size_t(4 * row)];
@@ -124,7 +124,7 @@ Differences compare(const TracingScene& scene, std::span<const Ray> rays, std::s
     for (size_t i = 0; i < rays.size(); i++) {
         const BatchHit& a = ours[i];
         const BatchHit& b = theirs[i];
-        if (a.hit.primitive == b.hit.primitive && a.instance == b.instance) continue;
+        if (a.hit.primitive == b.hit.primitive && a.hit.instance == b.hit.instance) continue;
         differences.primitives++;
         const double nearer = std::min(a.hit.t, b.hit.t);
         const double farther = std::max(a.hit.t, b.hit.t);

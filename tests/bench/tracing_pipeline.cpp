@@ -127,7 +127,7 @@ void TracingPipeline::build(const Mesh& mesh, std::span<const Transform3x4> inst
 
 void TracingPipeline::buildOne(VkAccelerationStructureTypeKHR type, const RawAcceleration& structure,
                                const VkAccelerationStructureGeometryKHR& geometry, uint32_t primitives) {
-    // Scratch memory's address has an alignment of 2^8 or less on every driver so far.
+    // The most that Vulkan lets a driver ask for the addresses of scratch memory.
     constexpr VkDeviceSize alignment = 256;
     const RawBuffer scratch =
         device_.createBuffer(structure.scratch_size + alignment,

@@ -10,7 +10,7 @@ set y2label 'time over that without widening'
 set logscale y
 set format y '10^{%T}'
 set yrange [0.05:]
-set y2range [0.8:1.6]
+set y2range [0.98:1.14]
 set y2tics
 set xrange [-28.5:-11.5]
 set key top center

@@ -269,7 +269,7 @@ Hierarchy encoded(const ExactTree& tree, const std::vector<std::array<Box, 8>>& 
     std::memcpy(result.texels.data(), &header, sizeof(header));
     for (size_t node = 1; node < boxes.size(); node++) {
         const detail::Node& old = tree.nodes[node];
-        const detail::Node fresh = encodeNode(grid, floats[node].data(), old.children(), old.leaves(),
+        const auto fresh = detail::Node::encode(grid, floats[node].data(), old.children(), old.leaves(),
                                               (old.words[2] >> 8) + old.leaves(), old.record());
         std::memcpy(&result.texels[4 * node], &fresh, sizeof(fresh));
     }

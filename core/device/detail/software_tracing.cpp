@@ -63,6 +63,7 @@ private:
 Expected<Hierarchy> build(const TracingObject& tracing, const HostInput& input) {
     const bool opaque = !(tracing.flags & Tracing::FlagTransparent);
     const BuildMode mode = buildMode(tracing.flags);
+    const NodeForm form = tracing.device()->heap()->nodes();
     if (tracing.tracing_type == Tracing::TypeBound) {
         std::vector<BoxGeometry> boxes;
         for (const TracingGeometry& geometry : tracing.geometries) {
@@ -72,7 +73,7 @@ Expected<Hierarchy> build(const TracingObject& tracing, const HostInput& input) 
             box.count = geometry.bounds;
             box.opaque = opaque;
         }
-        return buildHierarchy(boxes, mode, &ThreadPool::shared());
+        return buildHierarchy(boxes, mode, &ThreadPool::shared(), form);
     }
     std::vector<TriangleGeometry> triangles;
     for (const TracingGeometry& geometry : tracing.geometries) {
@@ -87,13 +88,14 @@ Expected<Hierarchy> build(const TracingObject& tracing, const HostInput& input) 
         triangle.index =
             geometry.index_format == FormatRu16 ? TriangleGeometry::Index::Uint16 : TriangleGeometry::Index::Uint32;
     }
-    return buildHierarchy(triangles, mode, &ThreadPool::shared());
+    return buildHierarchy(triangles, mode, &ThreadPool::shared(), form);
 }
 
 }  // namespace
 
 BuildMode buildMode(Tracing::Flags flags) {
-    return flags & Tracing::FlagFastBuild ? BuildMode::Fast : BuildMode::Quality;
+    if (flags & Tracing::FlagFastBuild) return BuildMode::Fast;
+    return (flags & Tracing::FlagFastTrace) && !(flags & Tracing::FlagUpdate) ? BuildMode::Split : BuildMode::Quality;
 }
 
 Expected<std::unique_ptr<NativeTracing>> createSoftwareTracing(DeviceObject& device, const TracingObject& tracing,
@@ -159,7 +161,8 @@ Expected<Hierarchy> buildInstances(const TracingObject& tracing) {
             to.texel = softwareOf(*bottom).range.first;
         }
     }
-    return buildHierarchy(instances, buildMode(tracing.flags), &ThreadPool::shared());
+    return buildHierarchy(instances, buildMode(tracing.flags), &ThreadPool::shared(),
+                          tracing.device()->heap()->nodes());
 }
 
 Status DeviceObject::buildOnHost(std::span<TracingObject* const> tracings, Where where) {

@@ -24,10 +24,18 @@ HeapForm chooseForm(const DeviceObject& device) {
             if (std::string_view(asked) == toString(form) &&
                 (form != HeapForm::Address || device.features().bufferAddress))
                 return form;
-    // Measured in docs/tracing.md.
+    // Measured in docs/tracing.md: texel buffers are the cheapest on lavapipe, addresses a little ahead on GPUs.
     constexpr uint64_t enough = (1ull << 30) / texel_size;
-    if (device.features().maxTexels >= enough) return HeapForm::Texels;
-    return device.features().bufferAddress ? HeapForm::Address : HeapForm::Storage;
+    const bool has_texels = device.features().maxTexels >= enough;
+    if (device.features().bufferAddress && !(device.info().cpu && has_texels)) return HeapForm::Address;
+    return has_texels ? HeapForm::Texels : HeapForm::Storage;
+}
+
+NodeForm chooseNodes(const DeviceObject& device) {
+    const char* const asked = std::getenv("GLINT_TRACING_NODES");
+    if (asked && std::string_view(asked) == "packed") return NodeForm::Packed;
+    if (asked && std::string_view(asked) == "full") return NodeForm::Full;
+    return nodeFormOf(device.info().cpu);
 }
 
 }  // namespace
@@ -53,7 +61,8 @@ void TracingHeap::Range::release() {
     texels = 0;
 }
 
-TracingHeap::TracingHeap(DeviceObject& device) : device_(device), form_(chooseForm(device)) {
+TracingHeap::TracingHeap(DeviceObject& device)
+    : device_(device), form_(chooseForm(device)), nodes_(chooseNodes(device)) {
     const Features& features = device.features();
     uint64_t bytes = features.maxBufferSize;
     if (form_ == HeapForm::Texels) bytes = std::min(bytes, features.maxTexels * texel_size);
@@ -66,8 +75,8 @@ TracingHeap::TracingHeap(DeviceObject& device) : device_(device), form_(chooseFo
     limit_ = std::min<uint64_t>(bytes / texel_size, UINT32_MAX) / alignment * alignment;
 
     rewrite_.library = "glint/tracing/query.h";
-    rewrite_.macros =
-        fmt::format("GLINT_TRACING_MEMORY={}; GLINT_TRACING_BUFFERS={}", static_cast<int>(form_), buffers_);
+    rewrite_.macros = fmt::format("GLINT_TRACING_MEMORY={}; GLINT_TRACING_BUFFERS={}; GLINT_TRACING_NODES={}",
+                                  static_cast<int>(form_), buffers_, static_cast<int>(nodes_));
     rewrite_.set = std::min(features.maxSets, 8u) - 1;
 
     texels_ = Ref<BufferObject>::adopt(new BufferObject(&device));

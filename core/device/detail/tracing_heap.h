@@ -46,7 +46,8 @@ public:
     /// Texels: 256 bytes, so that a range can be bound as any kind of buffer.
     static constexpr uint64_t alignment = 16;
 
-    /// `form` as $GLINT_TRACING_MEMORY ("texels", "storage", "address") says, else the device's best.
+    /// Form and nodes as $GLINT_TRACING_MEMORY ("texels", "storage", "address") and $GLINT_TRACING_NODES ("packed",
+    /// "full") say, else the device's best.
     explicit TracingHeap(DeviceObject& device);
 
     /// May submit and wait, so not under a lock of the device. From any thread. Errors: "tracing.heap",
@@ -57,6 +58,7 @@ public:
     bool writeDirectly(const Range& range, const void* texels, uint64_t size);
 
     HeapForm form() const { return form_; }
+    NodeForm nodes() const { return nodes_; }
     /// A kernel of the builder on the device, made when first asked for. From any thread. Errors: as of Kernel::create.
     Expected<KernelObject*> kernel(BuildKernel which);
     /// How shaders with ray queries are to be compiled.
@@ -76,6 +78,7 @@ private:
 
     DeviceObject& device_;
     HeapForm form_ = HeapForm::Texels;
+    NodeForm nodes_ = NodeForm::Packed;
     TracingRewrite rewrite_;
     uint32_t buffers_ = 1;
     uint64_t limit_ = 0;  ///< texels

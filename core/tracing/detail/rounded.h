@@ -8,7 +8,9 @@
 namespace glint::detail {
 
 inline float roundedDown(double x) {
-    const auto f = static_cast<float>(x);
+    // Volatile, as GCC 12 may leave out the rounding in a vectorised double(float(x)).
+    const volatile float stored = static_cast<float>(x);
+    const float f = stored;
     return f > x ? std::nextafter(f, -std::numeric_limits<float>::infinity()) : f;
 }
 

@@ -40,13 +40,14 @@ bool isInvertible(const Transform3x4& transform);
 ///
 /// Files are relative to the scene's folder. A place is a `transform`, three rows of four numbers, or any of
 /// `translate` (x, y, z), `rotate` (an axis of any length through the origin, and degrees, counter-clockwise seen from
-/// its tip) and `scale` (one number, or three): p' = translate + rotate(scale * p). `mask` is 0 to 255, `index` 0 to
-/// 4294967294.
+/// its tip) and `scale` (one number, or three): p' = translate + rotate(scale * p). `mask` is 0 to 255, `index` at
+/// most 4294967294.
 struct MeshScene {
     static constexpr uint64_t max_bytes = 1ull << 28;  ///< of the text
     static constexpr size_t max_meshes = 1u << 16;
     static constexpr size_t max_instances = 1u << 20;
 
+    /// A mesh of the scene.
     struct File {
         std::string name;
         std::filesystem::path path;  ///< as opened

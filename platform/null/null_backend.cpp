@@ -23,7 +23,6 @@ DeviceInfo describeAdapter(const NullSettings& settings) {
     info.api = "null";
     info.version = "1.0.0";
     info.driver = "Glint";
-    info.cpu = true;
     info.features = FeatureAll & ~settings.missing;
     return info;
 }

@@ -147,7 +147,7 @@ Outcome runScene(Device& device, bool careful) {
     return outcome;
 }
 
-class Failure : public testing::Test {
+class Failure : public testing::TestWithParam<TracingEngine> {
 protected:
     /// Opens a device with these settings and runs the scene; checks what holds whatever happens.
     Outcome run(const NullSettings& settings, bool careful) {
@@ -155,8 +155,10 @@ protected:
         const ScopedSettings scope(settings);
         Outcome outcome;
         {
-            Device device = Device::create(
-                {.api = "null", .message = [this](const Message& message) { messages.push_back(message.error); }});
+            Device device =
+                Device::create({.api = "null", .tracing = GetParam(), .message = [this](const Message& message) {
+                                    messages.push_back(message.error);
+                                }});
             control = NullControl::last();
             EXPECT_TRUE(device) << device.error().text();
             outcome = runScene(device, careful);
@@ -183,7 +185,7 @@ protected:
     bool is_lost = false;
 };
 
-TEST_F(Failure, TheSceneIsWell) {
+TEST_P(Failure, TheSceneIsWell) {
     for (const bool careful : {true, false}) {
         const Outcome outcome = run({}, careful);
         EXPECT_TRUE(outcome.finished);
@@ -192,7 +194,7 @@ TEST_F(Failure, TheSceneIsWell) {
     }
 }
 
-TEST_F(Failure, EveryCreation) {
+TEST_P(Failure, EveryCreation) {
     for (const bool careful : {true, false}) {
         for (const bool mapped : {true, false}) {
             uint64_t n = 1;
@@ -200,6 +202,8 @@ TEST_F(Failure, EveryCreation) {
                 SCOPED_TRACE(n);
                 const Outcome outcome = run({.mapped = mapped, .fail_creation = n}, careful);
                 if (control->counters().creations < n) break;
+                // The software engine's heap makes do with what is needed if there is no memory to grow further.
+                if (GetParam() == TracingEngine::Software && outcome.finished && messages.empty()) continue;
                 EXPECT_THAT(outcome.error, HasErrorId("device.out_of_memory"));
                 EXPECT_TRUE(wasTold("device.out_of_memory"));
                 ASSERT_LT(n, 1000u);
@@ -209,7 +213,7 @@ TEST_F(Failure, EveryCreation) {
     }
 }
 
-TEST_F(Failure, EverySubmission) {
+TEST_P(Failure, EverySubmission) {
     for (const ErrorCode code : {ErrorCode::OutOfMemory, ErrorCode::DeviceLost}) {
         const char* id = code == ErrorCode::OutOfMemory ? "device.out_of_memory" : "device.lost";
         for (const bool careful : {true, false}) {
@@ -228,7 +232,7 @@ TEST_F(Failure, EverySubmission) {
     }
 }
 
-TEST_F(Failure, AnyAmountOfMemory) {
+TEST_P(Failure, AnyAmountOfMemory) {
     run({}, true);
     for (uint64_t memory = 64; memory < 32u << 20; memory += memory / 3) {
         SCOPED_TRACE(memory);
@@ -239,21 +243,25 @@ TEST_F(Failure, AnyAmountOfMemory) {
     ADD_FAILURE() << "the scene does not fit into 32 MiB";
 }
 
-TEST_F(Failure, EveryFeature) {
+TEST_P(Failure, EveryFeature) {
     for (uint32_t i = 0; i < FeatureCount; i++) {
         const auto feature = static_cast<Feature>(1ull << i);
         SCOPED_TRACE(toString(feature));
         const Outcome outcome = run({.missing = feature}, true);
-        const bool needed = feature == FeatureComputeTracing || feature == FeatureTimestamps;
+        const bool needed =
+            (feature == FeatureComputeTracing && GetParam() == TracingEngine::Driver) || feature == FeatureTimestamps;
         EXPECT_EQ(!outcome.finished, needed) << outcome.error.text();
         EXPECT_EQ(outcome.error.code(), needed ? ErrorCode::Unsupported : ErrorCode::None) << outcome.error.text();
     }
 }
 
-TEST_F(Failure, FewerQueues) {
+TEST_P(Failure, FewerQueues) {
     for (const bool compute : {true, false})
         for (const bool copy : {true, false}) EXPECT_TRUE(run({.queues = {true, compute, copy}}, true).finished);
 }
+
+INSTANTIATE_TEST_SUITE_P(Engines, Failure, testing::Values(TracingEngine::Driver, TracingEngine::Software),
+                         [](const auto& test) { return std::string(toString(test.param)); });
 
 }  // namespace
 }  // namespace glint::test

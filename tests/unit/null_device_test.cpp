@@ -33,15 +33,17 @@ void main() {
 
 class NullDevice : public testing::Test {
 protected:
-    void open(const NullSettings& settings = {}, FeatureMask required = 0) {
+    void open(const NullSettings& settings = {}, FeatureMask required = 0,
+              TracingEngine tracing = TracingEngine::Driver) {
         device = {};
         const ScopedSettings scope(settings);
-        device = Device::create({.api = "null", .required = required, .message = [this](const Message& message) {
-                                     if (expected == message.error.id())
-                                         told++;
-                                     else
-                                         ADD_FAILURE() << message.error.text();
-                                 }});
+        device = Device::create(
+            {.api = "null", .required = required, .tracing = tracing, .message = [this](const Message& message) {
+                 if (expected == message.error.id())
+                     told++;
+                 else
+                     ADD_FAILURE() << message.error.text();
+             }});
         if (device) control = NullControl::last();
     }
     void SetUp() override { open(); }
@@ -93,6 +95,17 @@ TEST_F(NullDevice, LacksWhatItIsTold) {
     EXPECT_FALSE(device.getFeatures().computeTracing);
     EXPECT_TRUE(device.getFeatures().rayTracing);
     EXPECT_FALSE(device.hasQueue(Queue::Compute));
+    // What the driver lacks, Glint's own engine offers where it may.
+    for (const TracingEngine engine : {TracingEngine::Auto, TracingEngine::Software}) {
+        open({.missing = FeatureComputeTracing}, FeatureComputeTracing, engine);
+        ASSERT_TRUE(device);
+        EXPECT_TRUE(device.getFeatures().computeTracing);
+        EXPECT_EQ(device.getFeatures().tracingEngine, TracingEngine::Software);
+    }
+    open({}, FeatureComputeTracing, TracingEngine::Auto);
+    ASSERT_TRUE(device);
+    EXPECT_EQ(device.getFeatures().tracingEngine, TracingEngine::Driver);
+    EXPECT_THAT(device.getInfo().tracing, testing::HasSubstr("driver"));
     const Device other = Device::create({.api = "null", .adapter = "llvmpipe", .message = [](const Message&) {}});
     EXPECT_THAT(other, HasErrorId("device.no_adapter"));
 }

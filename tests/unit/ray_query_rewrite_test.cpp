@@ -206,7 +206,7 @@ TEST_F(RewriteTest, MergedLayoutsKeepTheHiddenApart) {
     ASSERT_EQ(layout->hidden.size(), 1u);
     EXPECT_EQ(layout->hidden[0].set, 7u);
     EXPECT_EQ(layout->hidden[0].stages, stageBit(ShaderStage::Fragment));
-    EXPECT_EQ(layout->set_count, 1u);
+    EXPECT_EQ(layout->set_count, 8u);
     // One engine for all the stages.
     const std::array mixed = {&vertex->reflection, &drivers->reflection};
     EXPECT_THAT(mergeLayouts(mixed), HasErrorId("shader.binding_conflict"));

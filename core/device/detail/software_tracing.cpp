@@ -42,7 +42,10 @@ private:
             return {};
         }
         Expected<Ref<BufferObject>> staging = device_.createStaging(buffer.size, true, where_);
-        if (!staging) return staging.error();
+        if (!staging) {
+            device_.report(staging.error());
+            return staging.error();
+        }
         BufferObject& memory = **staging;
         const Status copied = device_.playNow("read-back", where_, [&](RecorderCore& core) {
             core.copyBuffer(memory, 0, buffer, 0, buffer.size);

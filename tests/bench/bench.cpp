@@ -57,8 +57,9 @@ void Report::write() const {
     check(writeTextFile(options_.json, kept.dump(2) + "\n"));
 }
 
-Device createDevice() {
+Device createDevice(TracingEngine tracing) {
     DeviceDesc desc;
+    desc.tracing = tracing;
     desc.validation = DeviceDesc::Validation::Off;
     return check(Device::create(desc));
 }

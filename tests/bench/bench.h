@@ -84,7 +84,7 @@ decltype(auto) check(T&& result) {
 }
 
 /// The adapter that $GLINT_ADAPTER or the default chooses, without validation.
-Device createDevice();
+Device createDevice(TracingEngine tracing = TracingEngine::Auto);
 /// "llvmpipe (LLVM 15.0.6, 256 bits), Mesa 25.0.7, AMD EPYC": adapter, driver and processor.
 std::string deviceName(const Device& device);
 std::string processorName();

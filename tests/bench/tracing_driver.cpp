@@ -123,7 +123,7 @@ double driver(const Device& device, const DriverScene& scene, std::span<const Ra
 }
 
 void run(Report& report) {
-    const Device device = createDevice();
+    const Device device = createDevice(TracingEngine::Driver);
     if (!device.getFeatures().computeTracing) {
         fmt::print("  left out: {} has no ray queries\n\n", device.getInfo().name);
         return;

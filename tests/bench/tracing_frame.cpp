@@ -247,7 +247,7 @@ private:
 };
 
 void run(Report& report) {
-    Device device = createDevice();
+    Device device = createDevice(TracingEngine::Driver);
     if (!device.getFeatures().computeTracing) {
         fmt::print("  left out: {} has no ray queries\n\n", device.getInfo().name);
         return;

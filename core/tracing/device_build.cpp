@@ -1,6 +1,7 @@
 #include <glint/tracing/detail/device_build.h>
 
 #include <glint/base/format_error.h>
+#include <glint/tracing/detail/node.h>
 #include <glint/tracing/detail/primitives.h>
 
 #include <algorithm>
@@ -56,6 +57,10 @@ const Program& program(BuildKernel kernel) {
     return programs[static_cast<uint32_t>(kernel)];
 }
 
+constexpr uint32_t widthOf(NodeForm form) { return form == NodeForm::Packed ? Node::width : FullNode::width; }
+/// By how many binary levels a node lowers the height if it opens its highest children.
+constexpr uint32_t heightPerLevel(NodeForm form) { return std::bit_width(widthOf(form)) - 1; }
+
 uint32_t tiles(uint32_t count, uint32_t size) { return (count + size - 1) / size; }
 
 class Planner {
@@ -84,8 +89,9 @@ public:
         common_.list = take(nodes);
         common_.counts = take(std::max(digits * uint64_t(sort_tiles), 2 * uint64_t(scan_tiles)));
         common_.tie_bits = static_cast<uint32_t>(std::bit_width(std::max(primitives_, 1u) - 1));
-        common_.levels = (code_bits + common_.tie_bits + 2) / 3;
-        if (input_.kind == Hierarchy::Kind::Instances) common_.instances = 4 * (nodes + 1) + 3 * primitives_;
+        common_.levels = tiles(code_bits + common_.tie_bits, heightPerLevel(input_.form));
+        if (input_.kind == Hierarchy::Kind::Instances)
+            common_.instances = texelsOf(input_.form) * (nodes + 1) + 3 * primitives_;
 
         add(BuildKernel::Begin, state_words);
         addBoxes();
@@ -108,7 +114,7 @@ public:
         add(BuildKernel::Tree, primitives_);
         if (primitives_ > 1) {
             for (common_.step = 0; common_.step < common_.levels; common_.step++)
-                add(BuildKernel::Collapse, std::min(nodes, levelThreads(common_.step)));
+                add(BuildKernel::Collapse, std::min(nodes, levelThreads(common_.step * heightPerLevel(input_.form))));
             common_.count = scan_tiles;
             addGroups(BuildKernel::ScanSum, scan_tiles);
             addGroups(BuildKernel::SortScan, 2);
@@ -138,9 +144,10 @@ public:
     }
 
 private:
-    /// Threads for a level of nodes. How many nodes it has is not known here: the first levels have up to eight times
-    /// as many as the one above; the last ones are seldom reached, and each thread takes several if they are.
-    static uint32_t levelThreads(uint32_t level) { return level <= 9 ? 1u << std::min(3 * level, 16u) : 1u << 12; }
+    /// Threads for a level of nodes, below so many binary levels. How many nodes it has is not known here: the first
+    /// levels have up to as many times those of the one above as a node has children; the last ones are seldom reached,
+    /// and each thread takes several if they are.
+    static uint32_t levelThreads(uint32_t height) { return height <= 27 ? 1u << std::min(height, 16u) : 1u << 12; }
 
     BuildPass& add(BuildKernel kernel, uint32_t threads) {
         BuildPass& pass = plan_.passes.emplace_back();
@@ -232,8 +239,11 @@ Expected<uint32_t> countPrimitives(const DeviceInput& input) {
     return static_cast<uint32_t>(count);
 }
 
-/// A node that has inner children has eight; docs/tracing.md, "Building on the device".
-uint32_t mostNodes(uint32_t primitives) { return primitives < 2 ? 1 : 4 * (primitives - 2) / 7 + 1; }
+/// A node that has inner children has as many as it can; docs/tracing.md, "Building on the device".
+uint32_t mostNodes(NodeForm form, uint32_t primitives) {
+    const uint32_t width = widthOf(form);
+    return primitives < 2 ? 1 : width / 2 * (primitives - 2) / (width - 1) + 1;
+}
 
 }  // namespace
 
@@ -248,8 +258,8 @@ Expected<DeviceSizes> deviceSizes(const DeviceInput& input) {
     const Expected<uint32_t> primitives = countPrimitives(input);
     if (!primitives) return unexpected(primitives.error());
     DeviceSizes sizes;
-    sizes.nodes = mostNodes(*primitives);
-    sizes.texels = 4 * (uint64_t(sizes.nodes) + 1) + 3 * uint64_t(*primitives);
+    sizes.nodes = mostNodes(input.form, *primitives);
+    sizes.texels = texelsOf(input.form) * (uint64_t(sizes.nodes) + 1) + 3 * uint64_t(*primitives);
     if (input.kind == Hierarchy::Kind::Instances) sizes.texels += 8 * uint64_t(*primitives);
     sizes.build_scratch = Planner(input, *primitives, 0, 4).build(sizes.nodes).scratch;
     return sizes;
@@ -258,7 +268,7 @@ Expected<DeviceSizes> deviceSizes(const DeviceInput& input) {
 Expected<BuildPlan> planBuild(const DeviceInput& input, uint32_t texel, uint32_t alignment) {
     const Expected<uint32_t> primitives = countPrimitives(input);
     if (!primitives) return unexpected(primitives.error());
-    return Planner(input, *primitives, texel, alignment).build(mostNodes(*primitives));
+    return Planner(input, *primitives, texel, alignment).build(mostNodes(input.form, *primitives));
 }
 
 Expected<BuildPlan> planRefit(const DeviceInput& input, uint32_t nodes, uint32_t texel, uint32_t alignment) {

@@ -2,8 +2,6 @@
 // way of a ray through them. Included by traversal.h.
 #pragma once
 
-#define GLINT_NODE_TEXELS 8u
-
 // Entries of the stack: a hierarchy has 32 levels of nodes at most, and each leaves three children to wait.
 #define GLINT_TRACING_STACK (96 * GLINT_TRACING_LEVELS)
 

@@ -3,8 +3,6 @@
 // Included by traversal.h.
 #pragma once
 
-#define GLINT_NODE_TEXELS 4u
-
 // Entries of the stack: a hierarchy has 24 levels of nodes at most, and the last one pushes nothing; but the instances
 // beside the one that the ray is within wait too.
 #define GLINT_TRACING_STACK (24 * GLINT_TRACING_LEVELS - 1)

@@ -12,12 +12,7 @@
 #ifndef GLINT_TRACING_QUERIES
 #define GLINT_TRACING_QUERIES 1
 #endif
-// The form of the hierarchies' nodes: NodeForm of core/tracing/detail/hierarchy.h.
-#define GLINT_NODES_PACKED 0
-#define GLINT_NODES_FULL 1
-#ifndef GLINT_TRACING_NODES
-#define GLINT_TRACING_NODES GLINT_NODES_PACKED
-#endif
+#include <glint/tracing/node_form.h>
 
 // Of a hierarchy, as in core/tracing/detail/hierarchy.h.
 const uint GLINT_KIND_TRIANGLES = 0u;

@@ -21,7 +21,7 @@ void check(const Status& status) {
 
 Buffer DeviceBuilder::createHeap(uint64_t texels) {
     Buffer::Flags flags = Buffer::FlagTexel | Buffer::FlagStorage;
-    if (form_ == HeapForm::Address) flags |= Buffer::FlagAddress;
+    if (heap_ == HeapForm::Address) flags |= Buffer::FlagAddress;
     return device_.createBuffer(flags, texels * sizeof(Texel), "heap");
 }
 
@@ -35,7 +35,8 @@ const Kernel& DeviceBuilder::kernel(BuildKernel kernel) {
     Kernel& result = kernels_[static_cast<uint32_t>(kernel)];
     if (!result) {
         result = device_.createKernel(fmt::format("build {}", static_cast<uint32_t>(kernel)));
-        result.createShaderGLSL(kernelSource(kernel), fmt::format("GLINT_TRACING_MEMORY={}", static_cast<int>(form_)));
+        result.createShaderGLSL(kernelSource(kernel), fmt::format("GLINT_TRACING_MEMORY={};GLINT_TRACING_NODES={}",
+                                                                  static_cast<int>(heap_), static_cast<int>(nodes_)));
         check(result.create());
     }
     return result;
@@ -43,13 +44,13 @@ const Kernel& DeviceBuilder::kernel(BuildKernel kernel) {
 
 void DeviceBuilder::record(Compute& compute, const BuildPlan& plan, const Buffer& heap, const Buffer& scratch,
                            std::span<const GeometryBuffers> geometries) {
-    if (form_ == HeapForm::Address) compute.useBuffer(heap, true);
+    if (heap_ == HeapForm::Address) compute.useBuffer(heap, true);
     for (const BuildPass& pass : plan.passes) {
         compute.setKernel(kernel(pass.kernel));
         uint32_t slot = 0;
         if (usesHeap(pass.kernel)) {
-            if (form_ == HeapForm::Texels) compute.setTexelBuffer(0, heap, FormatRGBAu32);
-            if (form_ == HeapForm::Storage) compute.setStorageBuffer(slot++, heap);
+            if (heap_ == HeapForm::Texels) compute.setTexelBuffer(0, heap, FormatRGBAu32);
+            if (heap_ == HeapForm::Storage) compute.setStorageBuffer(slot++, heap);
         }
         compute.setStorageBuffer(slot++, scratch);
         for (uint32_t i = 0; i < pass.input_count; i++) {
@@ -81,6 +82,7 @@ Hierarchy DeviceBuilder::read(const Buffer& heap, uint32_t texel) {
     check(device_.getBuffer(heap, texel * sizeof(Texel), &header, sizeof(header)));
     Hierarchy hierarchy;
     hierarchy.kind = static_cast<Hierarchy::Kind>(header.kind);
+    hierarchy.form = nodes_;
     hierarchy.nodes = header.nodes;
     hierarchy.records = header.records;
     size_t texels = hierarchy.firstRecord() + 3 * size_t(header.records);

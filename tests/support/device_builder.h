@@ -22,14 +22,16 @@ enum class HeapForm : uint8_t { Texels, Storage, Address };
 
 class DeviceBuilder {
 public:
-    explicit DeviceBuilder(const Device& device, HeapForm form = HeapForm::Texels) : device_(device), form_(form) {}
+    explicit DeviceBuilder(const Device& device, HeapForm heap = HeapForm::Texels,
+                           detail::NodeForm nodes = detail::NodeForm::Packed)
+        : device_(device), heap_(heap), nodes_(nodes) {}
 
     /// A buffer for `texels` of the heap.
     Buffer createHeap(uint64_t texels);
     /// Storage for bytes, filled up to a multiple of 4.
     Buffer createStorage(std::span<const std::byte> bytes);
 
-    /// Plays and submits. Throws std::runtime_error with what went wrong.
+    /// Plays and submits a plan for this form of nodes. Throws std::runtime_error with what went wrong.
     void play(const detail::BuildPlan& plan, const Buffer& heap, std::span<const GeometryBuffers> geometries);
     /// Records into a list; `scratch` has the plan's bytes.
     void record(Compute& compute, const detail::BuildPlan& plan, const Buffer& heap, const Buffer& scratch,
@@ -42,7 +44,8 @@ private:
     const Kernel& kernel(detail::BuildKernel kernel);
 
     Device device_;
-    HeapForm form_;
+    HeapForm heap_;
+    detail::NodeForm nodes_;
     Kernel kernels_[detail::build_kernels];
 };
 

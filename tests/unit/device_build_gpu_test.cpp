@@ -49,17 +49,20 @@ bool sameTexels(const Hierarchy& a, const Hierarchy& b) {
     return a.bytes() == b.bytes() && std::memcmp(a.texels.data(), b.texels.data(), a.bytes()) == 0;
 }
 
-class DeviceBuild : public DeviceTest {
+/// Every test runs with every form of nodes.
+class DeviceBuild : public DeviceTest, public ::testing::WithParamInterface<NodeForm> {
 protected:
     static constexpr uint32_t texel = 5;  // hierarchies need not begin at the heap's
 
     static void TearDownTestSuite() {
-        for (auto& each : builders) each.reset();
+        for (auto& form : builders) {
+            for (auto& each : form) each.reset();
+        }
     }
     /// Kernels are compiled once.
     DeviceBuilder& builder(HeapForm form = HeapForm::Texels) {
-        std::unique_ptr<DeviceBuilder>& each = builders[static_cast<uint32_t>(form)];
-        if (!each) each = std::make_unique<DeviceBuilder>(device, form);
+        std::unique_ptr<DeviceBuilder>& each = builders[static_cast<uint32_t>(GetParam())][static_cast<uint32_t>(form)];
+        if (!each) each = std::make_unique<DeviceBuilder>(device, form, GetParam());
         return *each;
     }
 
@@ -68,6 +71,12 @@ protected:
     template <class T>
     Buffer storage(const std::vector<T>& values) {
         return builder().createStorage(std::as_bytes(std::span(values)));
+    }
+    static DeviceInput inputOf(Hierarchy::Kind kind, const DeviceGeometry& geometry) {
+        return {kind, {geometry}, GetParam()};
+    }
+    static Hierarchy hostHierarchyOf(const Mesh& mesh, BuildMode mode = BuildMode::Quality) {
+        return hierarchyOf(mesh, mode, nullptr, GetParam());
     }
     GeometryBuffers buffersOf(const Mesh& mesh) { return {storage(mesh.positions), storage(mesh.indices)}; }
 
@@ -93,13 +102,17 @@ protected:
     }
     Hierarchy build(const Mesh& mesh, HeapForm form = HeapForm::Texels) {
         const GeometryBuffers buffers = buffersOf(mesh);
-        return build({Hierarchy::Kind::Triangles, {deviceGeometryOf(mesh)}}, std::span(&buffers, 1), form);
+        return build(inputOf(Hierarchy::Kind::Triangles, deviceGeometryOf(mesh)), std::span(&buffers, 1), form);
+    }
+
+    static std::string macros() {
+        return fmt::format("GLINT_TRACING_MEMORY=0;GLINT_TRACING_NODES={}", static_cast<int>(GetParam()));
     }
 
     std::vector<BatchHit> trace(const Hierarchy& hierarchy, const std::vector<Ray>& rays) {
         if (!batch) {
             batch = device.createKernel();
-            batch.createShaderGLSL("#include <glint/tracing/batch.h>\n", "GLINT_TRACING_MEMORY=0");
+            batch.createShaderGLSL("#include <glint/tracing/batch.h>\n", macros());
             EXPECT_TRUE(batch.create()) << batch.error().text();
         }
         const Buffer texels = device.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
@@ -194,7 +207,7 @@ void main() {
                               glintQueryPrimitiveIndex(q, true), glintQueryInstanceCustomIndex(q, true))
                       : uvec4(0xffffffffu);
 })",
-                                "GLINT_TRACING_MEMORY=0");
+                                macros());
         ASSERT_TRUE(kernel.create()) << kernel.error().text();
         const std::vector<Ray> rays = raysAt(BoundBox(Vector3f(-1.0f), Vector3f(1.0f)), 4000, 33);
         const auto count = static_cast<uint32_t>(rays.size());
@@ -230,32 +243,32 @@ void main() {
     Kernel batch;
 
 private:
-    inline static std::unique_ptr<DeviceBuilder> builders[3];
+    inline static std::unique_ptr<DeviceBuilder> builders[2][3];
 };
 
-TEST_F(DeviceBuild, HoldsItsPrimitivesForAllSizes) {
-    for (const uint32_t count : {0u, 1u, 2u, 7u, 8u, 9u, 63u, 64u, 65u, 511u, 513u, 4097u}) {
+TEST_P(DeviceBuild, HoldsItsPrimitivesForAllSizes) {
+    for (const uint32_t count : {0u, 1u, 2u, 3u, 4u, 5u, 7u, 8u, 9u, 63u, 64u, 65u, 511u, 513u, 4097u}) {
         SCOPED_TRACE(count);
         const Mesh mesh = soup(count, count + 1);
         const Hierarchy hierarchy = build(mesh);
         EXPECT_EQ(hierarchy.records, count);
-        if (count > 60) expectSameHits(hierarchy, hierarchyOf(mesh));
+        if (count > 60) expectSameHits(hierarchy, hostHierarchyOf(mesh));
     }
 }
 
-TEST_F(DeviceBuild, FindsWhatTheHostsHierarchiesFind) {
+TEST_P(DeviceBuild, FindsWhatTheHostsHierarchiesFind) {
     const Mesh torus = createTorus(1.0f, 0.4f, 250, 200);
     ASSERT_EQ(torus.triangleCount(), 100000u);
     const Hierarchy hierarchy = build(torus);
-    expectSameHits(hierarchy, hierarchyOf(torus), 20000);
+    expectSameHits(hierarchy, hostHierarchyOf(torus), 20000);
     // About what the host's builder makes of the same curve.
-    EXPECT_LE(hierarchy.nodes, hierarchyOf(torus, BuildMode::Fast).nodes * 1.1);
+    EXPECT_LE(hierarchy.nodes, hostHierarchyOf(torus, BuildMode::Fast).nodes * 1.1);
     const HierarchyWalk device_walk(hierarchy);
-    const HierarchyWalk host_walk(hierarchyOf(torus, BuildMode::Fast));
+    const HierarchyWalk host_walk(hostHierarchyOf(torus, BuildMode::Fast));
     EXPECT_LE(device_walk.area, host_walk.area * 1.1);
 }
 
-TEST_F(DeviceBuild, ReachesTheHeapInAllForms) {
+TEST_P(DeviceBuild, ReachesTheHeapInAllForms) {
     const Mesh mesh = soup(700, 3);
     const Hierarchy texels = build(mesh);
     EXPECT_TRUE(sameTexels(texels, build(mesh, HeapForm::Storage)));
@@ -263,7 +276,7 @@ TEST_F(DeviceBuild, ReachesTheHeapInAllForms) {
     EXPECT_TRUE(sameTexels(texels, build(mesh, HeapForm::Address)));
 }
 
-TEST_F(DeviceBuild, StandsWhatBuildersStumbleOver) {
+TEST_P(DeviceBuild, StandsWhatBuildersStumbleOver) {
     Mesh one_place = soup(1, 3);
     for (uint32_t i = 0; i < 1000; i++) {
         for (uint32_t c = 0; c < 3; c++) one_place.indices.push_back(c);
@@ -305,11 +318,11 @@ TEST_F(DeviceBuild, StandsWhatBuildersStumbleOver) {
     for (const auto& [name, mesh] : cases) {
         SCOPED_TRACE(name);
         const Hierarchy hierarchy = build(mesh);
-        EXPECT_EQ(hierarchy.records, hierarchyOf(mesh).records);
+        EXPECT_EQ(hierarchy.records, hostHierarchyOf(mesh).records);
     }
 }
 
-TEST_F(DeviceBuild, HoldsBoxesOfEverySize) {
+TEST_P(DeviceBuild, HoldsBoxesOfEverySize) {
     // Boxes from 2^-60 to 2^60 at places from 2^-60 to 2^60, in groups of a few, so that all scales of planes occur.
     Random random(6);
     for (const int magnitude : {-40, 0, 40}) {
@@ -329,15 +342,19 @@ TEST_F(DeviceBuild, HoldsBoxesOfEverySize) {
             geometry.primitives = 200;
             geometry.stride = 24;
             const GeometryBuffers buffers = {storage(boxes), {}};
-            EXPECT_EQ(build({Hierarchy::Kind::Boxes, {geometry}}, std::span(&buffers, 1)).records, 200u);
+            EXPECT_EQ(build(inputOf(Hierarchy::Kind::Boxes, geometry), std::span(&buffers, 1)).records, 200u);
         }
     }
 }
 
-TEST_F(DeviceBuild, KeepsToTheLevelsOfTheStack) {
+TEST_P(DeviceBuild, KeepsToTheLevelsOfTheStack) {
     // A chain of binary nodes, each with a sibling of seven groups of eight boxes: given seven children of a node, such
     // a sibling takes a node less. Boxes are larger the higher they are, so by cost one node takes but one step along
-    // the chain. The cells of the curve are of size 1.
+    // the chain, more than there are levels. Nodes of four children: three groups of four. The cells of the curve are
+    // of size 1.
+    const bool packed = GetParam() == NodeForm::Packed;
+    const int group_bits = packed ? 3 : 2;
+    const int copies = packed ? 8 : 4;
     std::vector<float> boxes;
     const auto add = [&](const Vector3d& center, double size) {
         for (const double side : {-0.5, 0.5}) {
@@ -347,15 +364,15 @@ TEST_F(DeviceBuild, KeepsToTheLevelsOfTheStack) {
     add(Vector3d(0.5), 1.0);
     add(Vector3d(1023.5), 1.0);
     double size = 500.0;
-    for (int step = 0; step < 18; step++) {
+    for (int step = 0; step < (packed ? 18 : 22); step++) {
         size *= 0.9;
-        for (int group = 0; group < 7; group++) {
+        for (int group = 0; group < copies - 1; group++) {
             Vector3d center(256.5);
             // The code's bits from this step's on: x, y, z of bit 7, of bit 6 and so on.
-            for (int bit = 0; bit < 4; bit++) {
+            for (int bit = 0; bit <= group_bits; bit++) {
                 if (bit == 0 || (group >> (bit - 1) & 1) != 0) center[(step + bit) % 3] += 1 << (7 - (step + bit) / 3);
             }
-            for (int copy = 0; copy < 8; copy++) add(center, size);
+            for (int copy = 0; copy < copies; copy++) add(center, size);
         }
     }
     DeviceGeometry geometry;
@@ -363,11 +380,11 @@ TEST_F(DeviceBuild, KeepsToTheLevelsOfTheStack) {
     geometry.stride = 24;
     const GeometryBuffers buffers = {storage(boxes), {}};
     // `build` walks through all nodes and expects that no record is missing.
-    const Hierarchy hierarchy = build({Hierarchy::Kind::Boxes, {geometry}}, std::span(&buffers, 1));
+    const Hierarchy hierarchy = build(inputOf(Hierarchy::Kind::Boxes, geometry), std::span(&buffers, 1));
     EXPECT_EQ(hierarchy.records, geometry.primitives);
 }
 
-TEST_F(DeviceBuild, LeavesOutWhatTheHostLeavesOut) {
+TEST_P(DeviceBuild, LeavesOutWhatTheHostLeavesOut) {
     constexpr float infinity = std::numeric_limits<float>::infinity();
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     Mesh mesh = soup(300, 2);
@@ -377,7 +394,7 @@ TEST_F(DeviceBuild, LeavesOutWhatTheHostLeavesOut) {
     mesh.positions[3 * 40].x = 1.3e30f;
     const Hierarchy hierarchy = build(mesh);
     EXPECT_EQ(hierarchy.records, 296u);
-    expectSameHits(hierarchy, hierarchyOf(mesh));
+    expectSameHits(hierarchy, hostHierarchyOf(mesh));
     // An index that names no vertex.
     Mesh wrong = soup(300, 2);
     wrong.indices[30] = 900;
@@ -409,7 +426,7 @@ TEST_F(DeviceBuild, LeavesOutWhatTheHostLeavesOut) {
     geometry.primitives = 20;
     geometry.stride = 24;
     const GeometryBuffers buffers = {storage(boxes), {}};
-    EXPECT_EQ(build({Hierarchy::Kind::Boxes, {geometry}}, std::span(&buffers, 1)).records, 17u);
+    EXPECT_EQ(build(inputOf(Hierarchy::Kind::Boxes, geometry), std::span(&buffers, 1)).records, 17u);
 }
 
 /// Four geometries of one mesh: as it is; a third of it with 16-bit indices; nothing; without indices, with a stride,
@@ -420,8 +437,8 @@ struct Geometries {
     std::vector<TriangleGeometry> host;
     DeviceInput device;
 
-    explicit Geometries(const Mesh& mesh)
-        : host(4), device{Hierarchy::Kind::Triangles, std::vector<DeviceGeometry>(4)} {
+    Geometries(const Mesh& mesh, NodeForm form)
+        : host(4), device{Hierarchy::Kind::Triangles, std::vector<DeviceGeometry>(4), form} {
         set(mesh);
     }
     /// Corners of triangle i are 3i .. 3i + 2.
@@ -462,9 +479,9 @@ struct Geometries {
     }
 };
 
-TEST_F(DeviceBuild, TakesSeveralGeometriesAndFormsOfIndices) {
+TEST_P(DeviceBuild, TakesSeveralGeometriesAndFormsOfIndices) {
     const Mesh mesh = soup(301, 12);
-    const Geometries geometries(mesh);
+    const Geometries geometries(mesh, GetParam());
     const Buffer positions = storage(mesh.positions);
     const GeometryBuffers buffers[4] = {{positions, storage(mesh.indices)},
                                         {positions, storage(geometries.shorts)},
@@ -472,7 +489,7 @@ TEST_F(DeviceBuild, TakesSeveralGeometriesAndFormsOfIndices) {
                                         {storage(geometries.spread), {}}};
     const Hierarchy hierarchy = build(geometries.device, buffers);
     EXPECT_EQ(hierarchy.records, 702u);
-    const Expected<Hierarchy> host = buildHierarchy(geometries.host, BuildMode::Quality);
+    const Expected<Hierarchy> host = buildHierarchy(geometries.host, BuildMode::Quality, nullptr, GetParam());
     ASSERT_TRUE(host);
     expectSameHits(hierarchy, *host);
     // Records as the host writes them, in whatever order.
@@ -492,14 +509,14 @@ Mesh deformed(Mesh mesh) {
     return mesh;
 }
 
-TEST_F(DeviceBuild, RefitsWhatTheDeviceOrTheHostHasBuilt) {
+TEST_P(DeviceBuild, RefitsWhatTheDeviceOrTheHostHasBuilt) {
     const Mesh mesh = soup(1500, 21, 2.0, -1.0);
     Mesh moved = deformed(mesh);
     moved.positions[3 * 77].y = std::numeric_limits<float>::quiet_NaN();
-    const DeviceInput input = {Hierarchy::Kind::Triangles, {deviceGeometryOf(mesh)}};
+    const DeviceInput input = inputOf(Hierarchy::Kind::Triangles, deviceGeometryOf(mesh));
     const GeometryBuffers before = buffersOf(mesh);
     const GeometryBuffers after = buffersOf(moved);
-    const Hierarchy fresh = hierarchyOf(moved);
+    const Hierarchy fresh = hostHierarchyOf(moved);
     for (const HeapForm form : {HeapForm::Texels, HeapForm::Storage}) {
         const Hierarchy built = build(input, std::span(&before, 1), form);
         const uint32_t nodes = deviceSizes(input)->nodes;
@@ -513,7 +530,7 @@ TEST_F(DeviceBuild, RefitsWhatTheDeviceOrTheHostHasBuilt) {
         expectSameHits(refitted, fresh);
     }
     for (const BuildMode mode : {BuildMode::Quality, BuildMode::Fast}) {
-        const Hierarchy built = hierarchyOf(mesh, mode);
+        const Hierarchy built = hostHierarchyOf(mesh, mode);
         heap = builder().createHeap(texel + built.texels.size());
         device.setBuffer(heap, texel * sizeof(Texel), built.texels.data(), built.bytes());
         builder().play(*planRefit(input, built.nodes, texel, alignment()), heap, std::span(&after, 1));
@@ -523,10 +540,10 @@ TEST_F(DeviceBuild, RefitsWhatTheDeviceOrTheHostHasBuilt) {
     }
 }
 
-TEST_F(DeviceBuild, RefitsSeveralGeometries) {
+TEST_P(DeviceBuild, RefitsSeveralGeometries) {
     Mesh mesh = soup(301, 12);
     mesh.positions[3 * 50].x = std::numeric_limits<float>::infinity();
-    Geometries geometries(mesh);
+    Geometries geometries(mesh, GetParam());
     const auto buffersFor = [&](const Mesh& each) {
         const Buffer positions = storage(each.positions);
         return std::vector<GeometryBuffers>{{positions, storage(each.indices)},
@@ -540,7 +557,7 @@ TEST_F(DeviceBuild, RefitsSeveralGeometries) {
     builder().play(*planRefit(geometries.device, built.nodes, texel, alignment()), heap, buffersFor(moved));
     const Hierarchy refitted = builder().read(heap, texel);
     const HierarchyWalk walk(refitted);
-    const Expected<Hierarchy> fresh = buildHierarchy(geometries.host, BuildMode::Quality);
+    const Expected<Hierarchy> fresh = buildHierarchy(geometries.host, BuildMode::Quality, nullptr, GetParam());
     ASSERT_TRUE(fresh);
     EXPECT_EQ(fresh->records, refitted.records);
     expectSameHits(refitted, *fresh);
@@ -572,16 +589,18 @@ std::vector<DeviceInstance> someInstances(uint32_t count, const uint32_t texels[
     return instances;
 }
 
-TEST_F(DeviceBuild, BuildsAndRefitsTopLevels) {
+TEST_P(DeviceBuild, BuildsAndRefitsTopLevels) {
     // Two bottom levels at the heap's begin, the top level behind.
-    const Hierarchy bottoms[2] = {hierarchyOf(createTorus(1.0f, 0.4f, 24, 12)), hierarchyOf(soup(200, 9, 2.0, -1.0))};
+    const Hierarchy bottoms[2] = {hostHierarchyOf(createTorus(1.0f, 0.4f, 24, 12)),
+                                  hostHierarchyOf(soup(200, 9, 2.0, -1.0))};
     const uint32_t places[2] = {3, 3 + static_cast<uint32_t>(bottoms[0].texels.size())};
     const auto top = static_cast<uint32_t>(places[1] + bottoms[1].texels.size());
     for (const uint32_t count : {1u, 9u, 400u}) {
         SCOPED_TRACE(count);
-        DeviceInput input = {Hierarchy::Kind::Instances, std::vector<DeviceGeometry>(1)};
-        input.geometries[0].primitives = count;
-        input.geometries[0].stride = 64;
+        DeviceGeometry geometry;
+        geometry.primitives = count;
+        geometry.stride = 64;
+        const DeviceInput input = inputOf(Hierarchy::Kind::Instances, geometry);
         const DeviceSizes sizes = *deviceSizes(input);
         heap = builder().createHeap(top + sizes.texels);
         for (int i = 0; i < 2; i++)
@@ -604,7 +623,7 @@ TEST_F(DeviceBuild, BuildsAndRefitsTopLevels) {
                 host[i].offset = instances[i].offset_flags & 0xffffffu;
                 host[i].flags = instances[i].offset_flags >> 24;
             }
-            const Expected<Hierarchy> reference = buildHierarchy(host, BuildMode::Quality);
+            const Expected<Hierarchy> reference = buildHierarchy(host, BuildMode::Quality, nullptr, GetParam());
             ASSERT_TRUE(reference);
             EXPECT_EQ(result.records, reference->records);
             expectSameInstances(result, *reference, host);
@@ -612,6 +631,9 @@ TEST_F(DeviceBuild, BuildsAndRefitsTopLevels) {
         }
     }
 }
+
+INSTANTIATE_TEST_SUITE_P(Nodes, DeviceBuild, ::testing::Values(NodeForm::Packed, NodeForm::Full),
+                         [](const auto& each) { return each.param == NodeForm::Packed ? "Packed" : "Full"; });
 
 }  // namespace
 

@@ -8,7 +8,8 @@
 // through. Playing a plan, each pass after the one before has finished:
 //
 //   for (const BuildPass& pass : plan.passes) {
-//       kernel      createShaderGLSL(kernelSource(pass.kernel), "GLINT_TRACING_MEMORY=..."), made once
+//       kernel      createShaderGLSL(kernelSource(pass.kernel), "GLINT_TRACING_MEMORY=...;GLINT_TRACING_NODES=..."),
+//                   made once
 //       bindings    in this order: the heap if the kernel has it (usesHeap; a storage texel buffer of FormatRGBAu32,
 //                   GLINT_TRACING_BUFFERS storage buffers of 128 MiB, or none where it is reached by its address), the
 //                   scratch memory, pass.inputs
@@ -53,6 +54,7 @@ static_assert(sizeof(DeviceInstance) == 64);
 struct DeviceInput {
     Hierarchy::Kind kind = Hierarchy::Kind::Triangles;
     std::vector<DeviceGeometry> geometries;
+    NodeForm form = NodeForm::Packed;  ///< what the kernels are compiled for
 };
 
 /// The programs, by what they do.
@@ -83,7 +85,7 @@ enum class BuildKernel : uint8_t {
 };
 constexpr uint32_t build_kernels = 23;
 
-/// GLSL of a kernel, to be compiled with the macros of shaders/tracing/memory.h.
+/// GLSL of a kernel, to be compiled with the macros of shaders/tracing/memory.h and node_form.h.
 std::string kernelSource(BuildKernel kernel);
 /// True if it reads or writes the heap.
 bool usesHeap(BuildKernel kernel);

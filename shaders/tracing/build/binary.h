@@ -3,11 +3,12 @@
 //
 //   0, 1    children: another's index, or GLINT_LEAF and a place among the sorted primitives
 //   2 - 7   box
-//   8 - 14  costs: the least sum of areas of the nodes below, if it gives its parent at most 1 .. 7 children
+//   8 - 14  costs: the least sum of areas of the nodes below, if it gives its parent at most 1, 2, .. children, up to
+//           one less than a node has
 //   15      where the subtree that came first ends; then how the node gives out children: see tree.h
 //
-// and, once it has been chosen to become a node: 8 - 15 that node's children, leaves first, ended by GLINT_NONE; 0 the
-// node's place.
+// and, once it has been chosen to become a node: from 8 on that node's children, leaves first, ended by GLINT_NONE; 0
+// the node's place.
 #pragma once
 
 #include <glint/tracing/build/common.h>
@@ -16,7 +17,6 @@ const uint GLINT_BINARY_BOX = 2u;
 const uint GLINT_BINARY_END = 15u;
 const uint GLINT_BINARY_DECISIONS = 15u;
 const uint GLINT_BINARY_CHILDREN = 8u;
-const uint GLINT_WIDTH = 8u;
 
 uint glintBinary(uint index) { return build.nodes + 16u * index; }
 bool glintIsLeaf(uint child) { return (child & GLINT_LEAF) != 0u; }

@@ -4,6 +4,9 @@
 
 #include <glint/tracing/build/binary.h>
 
+// By how much a node lowers the height if it opens its highest children.
+const uint GLINT_HEIGHT_PER_LEVEL = GLINT_NODE_WIDTH == 8u ? 3u : 2u;
+
 // Of the node on its way: the first one's word, and how many there are. They take the place of the node's own costs and
 // decisions, which nobody needs any more.
 uint children;
@@ -17,8 +20,8 @@ void glintAddChild(uint child) { scratch[children + child_count++] = child; }
 // The cheapest, as tree.h has decided.
 void glintCollect(uint root) {
     // To be opened or not, and how many children each may become, four bits each.
-    uint waiting[GLINT_WIDTH];
-    uint most_of = GLINT_WIDTH;
+    uint waiting[GLINT_NODE_WIDTH];
+    uint most_of = GLINT_NODE_WIDTH;
     uint stacked = 1u;
     waiting[0] = root;
     while (stacked > 0u) {
@@ -38,9 +41,9 @@ void glintCollect(uint root) {
     }
 }
 
-// Opens children until there are eight or all are leaves: those of the largest boxes, or those that may be highest.
+// Opens children until there are as many as a node has or all are leaves: those of the largest boxes, or those that may be highest.
 void glintOpen(bool highest, float scale) {
-    while (child_count < GLINT_WIDTH) {
+    while (child_count < GLINT_NODE_WIDTH) {
         uint best = GLINT_NONE;
         float most = -1.0;
         for (uint i = 0u; i < child_count; i++) {
@@ -84,20 +87,20 @@ void main() {
         children = glintBinary(node) + GLINT_BINARY_CHILDREN;
         child_count = 0u;
         glintCollect(node);
-        // So that no more than 4/7 of a node is there for each primitive: docs/tracing.md.
+        // So that no more than 4/7 of a packed node or 2/3 of a full one is there for each primitive: docs/tracing.md.
         glintOpen(false, scale);
         uint height = 0u;
         for (uint c = 0u; c < child_count; c++) {
             const uint child = scratch[children + c];
             if (!glintIsLeaf(child)) height = max(height, glintHeightBound(child));
         }
-        if (height > 3u * levels_left) {
+        if (height > GLINT_HEIGHT_PER_LEVEL * levels_left) {
             scratch[children] = node;
             child_count = 1u;
             glintOpen(true, scale);
         }
         const uint leaves = glintPartition();
-        for (uint c = child_count; c < GLINT_WIDTH; c++) scratch[children + c] = GLINT_NONE;
+        for (uint c = child_count; c < GLINT_NODE_WIDTH; c++) scratch[children + c] = GLINT_NONE;
         const uint inner = child_count - leaves;
         scratch[build.sums + 2u * node] = inner;
         scratch[build.sums + 2u * node + 1u] = leaves;

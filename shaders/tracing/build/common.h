@@ -2,8 +2,10 @@
 // dispatches is core/tracing/device_build.cpp; docs/tracing.md has the algorithm.
 //
 // GLINT_BUILD_HEAP 1 for those that reach the heap; GLINT_BUILD_COHERENT 1 where threads of one dispatch wait for what
-// others have written.
+// others have written. GLINT_TRACING_NODES names the form of nodes, as in the traversal.
 #pragma once
+
+#include <glint/tracing/node_form.h>
 
 #ifndef GLINT_BUILD_HEAP
 #define GLINT_BUILD_HEAP 0

@@ -37,7 +37,7 @@ void main() {
 #endif
     GLINT_TRACING_STORE(build.hierarchy, uvec4(floatBitsToUint(minimum), floatBitsToUint(step)));
     GLINT_TRACING_STORE(build.hierarchy + 1u,
-                        uvec4(floatBitsToUint(step) - (2u << 23), nodes, 4u * (nodes + 1u), records));
+                        uvec4(floatBitsToUint(step) - (2u << 23), nodes, GLINT_NODE_TEXELS * (nodes + 1u), records));
     GLINT_TRACING_STORE(build.hierarchy + 2u, uvec4(floatBitsToUint(bounds.low), build.kind));
     GLINT_TRACING_STORE(build.hierarchy + 3u, uvec4(floatBitsToUint(bounds.high), instances));
 }

@@ -16,14 +16,14 @@ void main() {
         children = glintBinary(node) + GLINT_BINARY_CHILDREN;
         uint count = 0u;
         uint leaves = 0u;
-        for (; count < GLINT_WIDTH; count++) {
+        for (; count < GLINT_NODE_WIDTH; count++) {
             const uint child = scratch[children + count];
             if (child == GLINT_NONE) break;
             if (glintIsLeaf(child)) leaves++;
         }
         const uint first_node = 2u + scratch[build.sums + 2u * node];
         const uint first_record = scratch[build.sums + 2u * node + 1u];
-        glintStoreNode(build.hierarchy + 4u * scratch[glintBinary(node)],
+        glintStoreNode(build.hierarchy + GLINT_NODE_TEXELS * scratch[glintBinary(node)],
                        glintEncode(grid, count, leaves, first_node, first_record));
     }
 }

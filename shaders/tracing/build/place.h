@@ -12,7 +12,7 @@ void main() {
         const uint first_node = 2u + scratch[build.sums + 2u * node];
         const uint first_record = scratch[build.sums + 2u * node + 1u];
         uint leaves = 0u;
-        for (uint c = 0u; c < GLINT_WIDTH; c++) {
+        for (uint c = 0u; c < GLINT_NODE_WIDTH; c++) {
             const uint child = scratch[glintBinary(node) + GLINT_BINARY_CHILDREN + c];
             if (child == GLINT_NONE) break;
             if (glintIsLeaf(child)) {

@@ -20,7 +20,7 @@ void main() {
     const uint nodes = GLINT_TRACING_LOAD(build.hierarchy + 1u).y;
     GLINT_FOR(i, nodes) {
         const uint node = i + 1u;
-        const uint header = GLINT_TRACING_LOAD(build.hierarchy + 4u * node).z;
+        const uint header = GLINT_TRACING_LOAD(build.hierarchy + GLINT_NODE_TEXELS * node).z;
         scratch[glintNodeWord(node) + GLINT_NODE_DONE] = 0u;
         if (node == 1u) scratch[glintNodeWord(node) + GLINT_NODE_PARENT] = 0u;
         for (uint s = header & 15u; s < (header >> 4 & 15u); s++)
@@ -71,19 +71,19 @@ void main() {
     records = build.hierarchy + places.z;
     GLINT_FOR(i, places.y) {
         uint node = i + 1u;
-        header = GLINT_TRACING_LOAD(build.hierarchy + 4u * node).zw;
+        header = GLINT_TRACING_LOAD(build.hierarchy + GLINT_NODE_TEXELS * node).zw;
         if ((header.x & 15u) != (header.x >> 4 & 15u)) continue;
         for (;;) {
             const uint leaves = header.x & 15u;
             const uint count = header.x >> 4 & 15u;
             const GlintNodeTexels encoded =
                 glintEncode(grid, count, leaves, (header.x >> 8) + leaves & 0xffffffu, header.y >> 8);
-            glintStoreNode(build.hierarchy + 4u * node, encoded);
+            glintStoreNode(build.hierarchy + GLINT_NODE_TEXELS * node, encoded);
             const uint parent = scratch[glintNodeWord(node) + GLINT_NODE_PARENT];
             if (parent == 0u) break;
             glintSetScratchBox(glintNodeWord(node), encoded.box);
             memoryBarrierBuffer();
-            header = GLINT_TRACING_LOAD(build.hierarchy + 4u * parent).zw;
+            header = GLINT_TRACING_LOAD(build.hierarchy + GLINT_NODE_TEXELS * parent).zw;
             const uint done = atomicAdd(scratch[glintNodeWord(parent) + GLINT_NODE_DONE], 1u) + 1u;
             if (done < (header.x >> 4 & 15u) - (header.x & 15u)) break;
             memoryBarrierBuffer();

@@ -10,7 +10,7 @@
 // barrier between.
 layout(set = 0, binding = 1) coherent buffer GlintQuads { uvec4 quads[]; };
 
-// Costs for at most 1 .. 4 and 5 .. 7 children.
+// Costs for at most 1 .. 4 and 5 .. 7 children; of full nodes for at most 1 .. 3.
 struct GlintCosts {
     vec4 few;
     vec3 many;
@@ -36,8 +36,8 @@ GlintSubtree glintSubtree(uint child) {
     return result;
 }
 
-// Costs of a node over two subtrees, and how a node that may become 2 .. 8 children gives them out: three bits each, how
-// many of them are the left one's, or 0 if the node stays one child.
+// Costs of a node over two subtrees, and how a node that may become 2, 3, .. children gives them out: three bits each,
+// how many of them are the left one's, or 0 if the node stays one child.
 #define GLINT_TRY(cost, count)  \
     if ((cost) < best) {        \
         best = cost;            \
@@ -47,6 +47,23 @@ GlintCosts glintJoinCosts(GlintCosts left, GlintCosts right, float area, out uin
     GlintCosts costs;
     float best = GLINT_MOST;
     uint left_count = 1u;
+#if GLINT_TRACING_NODES == GLINT_NODES_FULL
+    GLINT_TRY(left.few.x + right.few.z, 1u)
+    GLINT_TRY(left.few.y + right.few.y, 2u)
+    GLINT_TRY(left.few.z + right.few.x, 3u)
+    decisions = left_count << 6;
+    best += area;
+    costs.few = vec4(best);
+    left_count = 0u;
+    GLINT_TRY(left.few.x + right.few.x, 1u)
+    decisions |= left_count;
+    costs.few.y = best;
+    GLINT_TRY(left.few.x + right.few.y, 1u)
+    GLINT_TRY(left.few.y + right.few.x, 2u)
+    decisions |= left_count << 3;
+    costs.few.z = best;
+    costs.many = vec3(best);
+#else
     GLINT_TRY(left.few.x + right.many.z, 1u)
     GLINT_TRY(left.few.y + right.many.y, 2u)
     GLINT_TRY(left.few.z + right.many.x, 3u)
@@ -91,6 +108,7 @@ GlintCosts glintJoinCosts(GlintCosts left, GlintCosts right, float area, out uin
     GLINT_TRY(left.many.y + right.few.x, 6u)
     decisions |= left_count << 15;
     costs.many.z = best;
+#endif
     return costs;
 }
 

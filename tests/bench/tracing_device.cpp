@@ -1,6 +1,6 @@
 // tracing.{build,refit}.device.{bunny,100k,1m}: millions of triangles a second of the builder on the device, from the
 // submission until the device is done, beside the host's builders. tracing.device.{bunny,100k,1m}.{camera,bounce}: rays
-// a second through its hierarchies over those through the host's quality ones.
+// a second through its hierarchies over those through the host's quality ones. All with the device's form of nodes.
 
 #include "bench/tracing_scenes.h"
 #include "support/device_builder.h"
@@ -17,8 +17,11 @@ namespace {
 
 using detail::BuildMode;
 using detail::Hierarchy;
+using detail::NodeForm;
 
 constexpr uint32_t rounds = 5;
+
+NodeForm formOf(const Device& device) { return detail::nodeFormOf(device.getInfo().cpu); }
 
 /// Wall clock, and seconds of all the process' threads on two processors: what lavapipe and the host's builders take
 /// where nothing else runs.
@@ -57,9 +60,9 @@ struct Builders {
     Hierarchy fast;
 
     Builders(Device device, const Mesh& mesh) {
-        const detail::DeviceInput input = {Hierarchy::Kind::Triangles, {test::deviceGeometryOf(mesh)}};
+        const detail::DeviceInput input = {Hierarchy::Kind::Triangles, {test::deviceGeometryOf(mesh)}, formOf(device)};
         const detail::DeviceSizes sizes = *check(detail::deviceSizes(input));
-        test::DeviceBuilder builder(device);
+        test::DeviceBuilder builder(device, test::HeapForm::Texels, input.form);
         const test::GeometryBuffers buffers = {builder.createStorage(std::as_bytes(std::span(mesh.positions))),
                                                builder.createStorage(std::as_bytes(std::span(mesh.indices)))};
         const Buffer heap = builder.createHeap(sizes.texels);
@@ -77,7 +80,8 @@ struct Builders {
                 builder.record(compute, *plan, heap, scratch, std::span(&buffers, 1));
                 clocks->take([&] { play(device, std::move(compute)); }, counts);
             }
-            host_build.take([&] { fast = test::hierarchyOf(mesh, BuildMode::Fast, &ThreadPool::shared()); }, counts);
+            host_build.take([&] { fast = test::hierarchyOf(mesh, BuildMode::Fast, &ThreadPool::shared(), input.form); },
+                            counts);
             host_refit.take(
                 [&] { check(detail::refitHierarchy(fast, std::span(&geometry, 1), &ThreadPool::shared())); }, counts);
         }
@@ -94,7 +98,9 @@ struct Builders {
 /// Rounds of rays through several hierarchies in turns.
 std::vector<Clocks> race(Device device, std::span<const Hierarchy* const> hierarchies, std::span<const Ray> rays) {
     Kernel kernel = device.createKernel();
-    kernel.createShaderGLSL("#include <glint/tracing/batch.h>\n", "GLINT_TRACING_MEMORY=0");
+    kernel.createShaderGLSL(
+        "#include <glint/tracing/batch.h>\n",
+        fmt::format("GLINT_TRACING_MEMORY=0;GLINT_TRACING_NODES={}", static_cast<int>(formOf(device))));
     check(kernel.create());
     const Buffer ray_buffer = device.createBuffer(Buffer::FlagStorage, rays);
     const Buffer hits = device.createBuffer(Buffer::FlagStorage, 32 * rays.size());
@@ -131,7 +137,8 @@ void run(Report& report) {
                    "million triangles a second", "nothing", deviceName(device));
         report.add(fmt::format("tracing.refit.device.{}", name), million / builders.device_refit.wall.minimum(),
                    "million triangles a second", "nothing", deviceName(device));
-        const Hierarchy quality = test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared());
+        const Hierarchy quality =
+            test::hierarchyOf(scene.mesh, BuildMode::Quality, &ThreadPool::shared(), formOf(device));
         for (const auto& [kind, rays] : {std::pair{"camera", &scene.camera}, std::pair{"bounce", &scene.bounce}}) {
             const Hierarchy* const all[] = {&quality, &builders.fast, &builders.ours};
             const std::vector<Clocks> clocks = race(device, all, *rays);

@@ -124,6 +124,7 @@ Expected<std::unique_ptr<NativeTracing>> createSoftwareTracing(DeviceObject& dev
 
 DeviceInput deviceInput(const TracingObject& tracing) {
     DeviceInput input;
+    input.form = tracing.device()->heap()->nodes();
     input.kind = tracing.tracing_type == Tracing::TypeInstance ? Hierarchy::Kind::Instances
                  : tracing.tracing_type == Tracing::TypeBound  ? Hierarchy::Kind::Boxes
                                                                : Hierarchy::Kind::Triangles;

@@ -8,6 +8,7 @@
 
 #include <glint/geometry/primitives.h>
 #include <glint/graphics/ray_caster.h>
+#include <glint/tracing/detail/header.h>
 #include <glint/tracing/detail/instances.h>
 
 #include <fmt/format.h>
@@ -140,6 +141,27 @@ protected:
                   rays / 50);
     }
 
+    /// Full nodes of the same bits, but for planes that are one float farther out: the host gives the next float on the
+    /// outer side of the exact difference, the kernels the one beyond the next on either side.
+    static void expectPlanesAFloatApart(const Hierarchy& ours, const Hierarchy& theirs) {
+        ASSERT_EQ(ours.bytes(), theirs.bytes());
+        EXPECT_EQ(std::memcmp(ours.texels.data(), theirs.texels.data(), sizeof(Header)), 0);
+        const Texel* records[] = {&ours.texels[ours.firstRecord()], &theirs.texels[ours.firstRecord()]};
+        EXPECT_EQ(std::memcmp(records[0], records[1], 3 * sizeof(Texel) * ours.records), 0);
+        for (uint32_t i = 1; i <= ours.nodes; i++) {
+            FullNode a;
+            FullNode b;
+            std::memcpy(&a, &ours.texels[texelsOf(FullNode::form) * size_t(i)], sizeof(a));
+            std::memcpy(&b, &theirs.texels[texelsOf(FullNode::form) * size_t(i)], sizeof(b));
+            for (uint32_t word = 0; word < std::size(a.words); word++) {
+                const bool is_plane = word >= 4 && word < 28 && word % 4 < b.children();
+                const bool is_low = word / 4 % 2 == 1;
+                const uint32_t out = is_low ? b.words[word] - a.words[word] : a.words[word] - b.words[word];
+                EXPECT_LE(out, is_plane ? 1u : 0u) << "node " << i << " word " << word;
+            }
+        }
+    }
+
     /// Records of the same bits, and boxes that hold the host's and are little larger.
     static void expectSameInstances(const Hierarchy& ours, const Hierarchy& theirs,
                                     const std::vector<HierarchyInstance>& instances) {
@@ -261,11 +283,12 @@ TEST_P(DeviceBuild, FindsWhatTheHostsHierarchiesFind) {
     ASSERT_EQ(torus.triangleCount(), 100000u);
     const Hierarchy hierarchy = build(torus);
     expectSameHits(hierarchy, hostHierarchyOf(torus), 20000);
-    // About what the host's builder makes of the same curve.
-    EXPECT_LE(hierarchy.nodes, hostHierarchyOf(torus, BuildMode::Fast).nodes * 1.1);
+    // About what the host's builder makes of the same curve, but for how equal codes and costs are told apart: 0.04 and
+    // 0.05 % more area, 0.8 and 1.0 % more nodes. A wrong choice of children costs 4 % of the area and more.
+    EXPECT_LE(hierarchy.nodes, hostHierarchyOf(torus, BuildMode::Fast).nodes * 1.02);
     const HierarchyWalk device_walk(hierarchy);
     const HierarchyWalk host_walk(hostHierarchyOf(torus, BuildMode::Fast));
-    EXPECT_LE(device_walk.area, host_walk.area * 1.1);
+    EXPECT_LE(device_walk.area, host_walk.area * 1.01);
 }
 
 TEST_P(DeviceBuild, ReachesTheHeapInAllForms) {
@@ -533,6 +556,8 @@ TEST_P(DeviceBuild, RefitsWhatTheDeviceOrTheHostHasBuilt) {
         const Hierarchy built = hostHierarchyOf(mesh, mode);
         heap = builder().createHeap(texel + built.texels.size());
         device.setBuffer(heap, texel * sizeof(Texel), built.texels.data(), built.bytes());
+        builder().play(*planRefit(input, built.nodes, texel, alignment()), heap, std::span(&before, 1));
+        if (GetParam() == NodeForm::Full) expectPlanesAFloatApart(builder().read(heap, texel), built);
         builder().play(*planRefit(input, built.nodes, texel, alignment()), heap, std::span(&after, 1));
         const Hierarchy refitted = builder().read(heap, texel);
         const HierarchyWalk walk(refitted);

@@ -159,7 +159,7 @@ Expected<DeviceSizes> deviceSizes(const DeviceInput& input);
 Expected<BuildPlan> planBuild(const DeviceInput& input, uint32_t texel, uint32_t alignment);
 
 /// Takes the coordinates again and keeps the tree, as refitHierarchy does: of a hierarchy built on the device or on the
-/// host, with at most that many nodes (DeviceSizes::nodes, Hierarchy::nodes). Counts and indices are those of the
+/// host, with at most that many nodes (DeviceSizes::nodes, Hierarchy::nodes). Form, counts and indices are those of the
 /// build. A top level takes its instances' matrices and hierarchies again too. Errors: those of deviceSizes.
 Expected<BuildPlan> planRefit(const DeviceInput& input, uint32_t nodes, uint32_t texel, uint32_t alignment);
 

@@ -175,10 +175,6 @@ private:
         if (resource.kind == SlotKind::Tracing) references(native<NullTracing>(bound.resource), stage);
     }
 
-    static bool isHeap(const Object& object) {
-        return object.type() == ObjectType::Buffer && static_cast<const BufferObject&>(object).is_heap;
-    }
-
     uint32_t find(const Object* object) const {
         return static_cast<uint32_t>(std::ranges::find(list_.resources, object) - list_.resources.begin());
     }
@@ -190,8 +186,6 @@ private:
     /// `resource` may be none, or the size of the list if it has no such resource.
     void need(uint32_t resource, Stage stage, uint8_t flags, const Slice& slice = {}, const std::string& what = {}) {
         if (resource == none) return;
-        // Writes to ranges of the heap are declared with the structures that lie there.
-        if (resource < list_.resources.size() && isHeap(*list_.resources[resource])) flags = AccessRead;
         const auto declares = [&](const Access& access) {
             return access.resource == resource && access.stage == stage && (access.flags & flags) == flags &&
                    access.slice.mip <= slice.mip && access.slice.mip + access.slice.mips >= slice.mip + slice.mips &&

@@ -146,7 +146,6 @@ public:
 
     uint64_t size = 0;
     Buffer::Flags flags = 0;
-    bool is_heap = false;  ///< a TracingHeap's: what its ranges hold is tracked by structure
     ResourceState use;
 };
 

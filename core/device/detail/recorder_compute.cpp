@@ -124,9 +124,8 @@ CopyBufferCommand& RecorderCore::copyBuffer(BufferObject& to, uint64_t to_offset
     if (&to == &from) {
         access(to_resource, Stage::Copy, AccessRead | AccessWrite);
     } else {
-        // The whole heap is read once all that is being written to its ranges is there.
-        access(from_resource, Stage::Copy, static_cast<uint8_t>(from.is_heap ? AccessRead | AccessWrite : AccessRead));
-        access(to_resource, Stage::Copy, tracing ? AccessRead : AccessWrite);
+        access(from_resource, Stage::Copy, AccessRead);
+        access(to_resource, Stage::Copy, AccessWrite);
     }
     if (tracing) access(structure, Stage::Copy, AccessWrite);
     auto& command = push<CopyBufferCommand>(CommandType::CopyBuffer);

@@ -161,7 +161,7 @@ bool RecorderCore::playPass(const BuildPass& pass, uint64_t scratch_size, Tracin
 
     beginAccesses();
     access(structure, Stage::Compute, AccessRead | AccessWrite);
-    if (uses_heap) access(heap_resource, Stage::Compute, AccessRead);
+    if (uses_heap) access(heap_resource, Stage::Compute, AccessRead | AccessWrite);
     access(scratch_resource, Stage::Compute, AccessRead | AccessWrite);
     for (const BoundResource& element : elements)
         if (element.resource != heap_resource && element.resource != scratch_resource)
@@ -219,7 +219,7 @@ bool RecorderCore::buildInstancesOnHost(TracingObject& tracing, Where where) {
     const uint32_t heap = use(device_->heap()->texels());
     placements_.push_back({Placement::Kind::Built, 0, resource});
     beginAccesses();
-    access(heap, Stage::Copy, AccessRead);
+    access(heap, Stage::Copy, AccessWrite);
     access(resource, Stage::Copy, AccessWrite);
     auto& command = push<CopyInlineCommand>(CommandType::CopyInline);
     command.header.untracked = false;  // see buildTracings

@@ -81,7 +81,6 @@ TracingHeap::TracingHeap(DeviceObject& device)
 
     texels_ = Ref<BufferObject>::adopt(new BufferObject(&device));
     texels_->setName("hierarchies");
-    texels_->is_heap = true;
 }
 
 Expected<TracingHeap::Range> TracingHeap::allocate(uint64_t texels, Where where) {

@@ -63,8 +63,7 @@ public:
     Expected<KernelObject*> kernel(BuildKernel which);
     /// How shaders with ray queries are to be compiled.
     const TracingRewrite& rewrite() const { return rewrite_; }
-    /// The texels; its native buffer is another one after growth. Reads and writes of structures declare an
-    /// AccessRead of it beside the access to the structure: only growth writes it as a whole.
+    /// The texels; its native buffer is another one after growth. Who reads or writes a structure reads or writes it.
     BufferObject& texels() const { return *texels_; }
     /// What the library's uniform block holds: the heap's address.
     uint64_t address() const { return texels_->nativeBuffer()->address; }

@@ -168,7 +168,8 @@ public:
     void createMipmaps(const Texture& texture, Where where = Where::current());
     void setTracing(const Tracing& tracing, std::span<const Tracing::Instance> instances,
                     Where where = Where::current());
-    /// With a scratch buffer of the caller's of at least getBuildSize() bytes.
+    /// With a scratch buffer of the caller's of at least getBuildSize() bytes. In the software engine structures made
+    /// without FlagFastBuild and FlagUpdate are built at once on the CPU's cores, as by buildTracings.
     void buildTracing(const Tracing& tracing, const Buffer& scratch, Where where = Where::current());
     void buildTracing(const Tracing& tracing, Where where = Where::current());
     void updateTracing(const Tracing& tracing, const Buffer& scratch, Where where = Where::current());
@@ -176,7 +177,9 @@ public:
 
     /// Builds many structures, bottom levels before top levels, in as many batches as the scratch buffer asks for (the
     /// SDK brings one if it is null). With Tracing::FlagCompact those made with that flag are compacted, which waits.
-    /// Errors: "tracing.scratch" if the buffer is smaller than the largest getBuildSize().
+    /// The software engine waits for the geometry, too, and builds bottom levels on the CPU's cores. Errors:
+    /// "tracing.scratch" if the buffer is smaller than the largest getBuildSize(); "tracing.index_range",
+    /// "tracing.heap" in software.
     Status buildTracings(std::span<const Tracing> tracings, const Buffer& scratch, Tracing::Flags flags = 0,
                          Where where = Where::current());
     Status buildTracings(std::initializer_list<Tracing> tracings, Tracing::Flags flags = 0,

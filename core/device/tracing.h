@@ -59,7 +59,8 @@ public:
     /// Room for `instances` of a top-level structure.
     void setInstances(uint32_t instances, std::source_location where = std::source_location::current());
 
-    /// Sizes and allocates the structure. Errors: "tracing.*".
+    /// Sizes the structure and makes room for it (in the software engine, that of what only the host builds comes with
+    /// its first build). Errors: "tracing.*".
     Status create(Type type, Flags flags = FlagFastTrace, std::source_location where = std::source_location::current());
 
     Type getType() const;
@@ -69,7 +70,7 @@ public:
     /// Bytes of scratch memory that a build or an update needs.
     uint64_t getBuildSize() const;
     uint64_t getUpdateSize() const;
-    /// Bytes of the structure; less after compaction.
+    /// Bytes of the structure; less after compaction. Before the first build in software: the most that it may take.
     uint64_t getMemory() const;
 };
 

@@ -270,7 +270,7 @@ Hierarchy encoded(const ExactTree& tree, const std::vector<std::array<Box, 8>>& 
     for (size_t node = 1; node < boxes.size(); node++) {
         const detail::Node& old = tree.nodes[node];
         const auto fresh = detail::Node::encode(grid, floats[node].data(), old.children(), old.leaves(),
-                                              (old.words[2] >> 8) + old.leaves(), old.record());
+                                                (old.words[2] >> 8) + old.leaves(), old.record());
         std::memcpy(&result.texels[4 * node], &fresh, sizeof(fresh));
     }
     return result;

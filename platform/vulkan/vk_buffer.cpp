@@ -35,7 +35,7 @@ VkBufferUsageFlags bufferUsage(Buffer::Flags flags, const FeatureChain& features
 Expected<std::unique_ptr<VulkanBuffer>> VulkanBuffer::create(VulkanDevice& device,
                                                              const detail::NativeBufferDesc& desc) {
     VkBufferCreateInfo info = {VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO};
-    info.size = desc.size;
+    info.size = (desc.size + 3) / 4 * 4;  // so that kernels may read it by words
     info.usage = bufferUsage(desc.flags, device.enabled.features);
     setSharing(info, device.families);
     MemoryKind kind = MemoryKind::Device;

@@ -132,6 +132,20 @@ TEST_P(TracingEngineTest, TheHeapGrowsAroundWhatItHolds) {
     }
 }
 
+TEST_P(TracingEngineTest, AnOddNumberOfShortIndices) {
+    const std::array<Vector3f, 3> corners = {Vector3f(-50, -50, 0), Vector3f(50, -50, 0), Vector3f(0, 80, 0)};
+    const std::array<uint16_t, 3> indices = {0, 1, 2};
+    Tracing bottom = device.createTracing("triangle");
+    bottom.addVertexBuffer(3, FormatRGBf32, 12, device.createBuffer(Buffer::FlagTracing, std::span(corners)));
+    bottom.addIndexBuffer(3, FormatRu16, device.createBuffer(Buffer::FlagTracing, std::span(indices)));
+    ASSERT_THAT(bottom.create(Tracing::TypeTriangle, Tracing::FlagFastBuild), IsOk());
+    const Tracing top = device.createTracing({Tracing::Instance{.tracing = &bottom}});
+    device.buildTracing(bottom);
+    device.buildTracing(top);
+    const std::vector<float> found = traced(top);
+    if (GetParam() != "null") { EXPECT_EQ(found, std::vector<float>(rays, 10.0f)); }
+}
+
 TEST_P(TracingEngineTest, RangesAreUsedAgain) {
     uint64_t bytes = 0;
     for (uint32_t i = 0; i < 20; i++) {

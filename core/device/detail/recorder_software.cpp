@@ -149,7 +149,8 @@ bool RecorderCore::playPass(const BuildPass& pass, uint64_t scratch_size, Tracin
             buffer = static_cast<BufferObject*>(tracing.geometries[input.geometry].index_buffer);
         if (input.buffer == BuildBinding::Buffer::Data) buffer = dataOf(tracing, input.geometry);
         const uint64_t offset = input.offset + (buffer == &scratch ? scratch_offset : 0);
-        bind(use(*buffer), offset, std::min(input.size, buffer->size - offset));
+        // Back ends make buffers of whole words.
+        bind(use(*buffer), offset, std::min(input.size, (buffer->size + 3) / 4 * 4 - offset));
     }
     for (const BoundResource& element : elements)
         if (element.size != whole_buffer && element.size > device_->features().maxStorageSize) {

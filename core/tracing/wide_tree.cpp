@@ -13,7 +13,7 @@ namespace {
 template <class Node>
 constexpr uint32_t height_per_level = std::bit_width(Node::width) - 1;
 template <class Node>
-constexpr bool fits = BinaryTree::max_height <= height_per_level<Node> * maxDepth(Node::form);
+constexpr bool fits = BinaryTree::max_height <= maxDepth(Node::form) * height_per_level<Node>;
 static_assert(fits<Node> && fits<FullNode>);
 
 /// A node to be: a binary subtree over the refs [begin, end), whose wide node has the place `node`.

@@ -291,7 +291,9 @@ TEST_P(MeshModelTest, MakesWhatIsMissing) {
 
 TEST_P(MeshModelTest, RefusesMoreThanABufferHolds) {
     const uint64_t limit = device.getFeatures().maxBufferSize;
-    if (limit > 1ull << 33) GTEST_SKIP() << "the device's buffers hold more than this machine";
+    if (limit > 1ull << 33)
+        GTEST_SKIP() << "a buffer beyond the device's limit of " << limit
+                     << " bytes needs data of that size in host memory";
     Mesh mesh = createPlane(1.0f);
     mesh.positions.resize(limit / 2048 + 1);
     mesh.normals.clear();

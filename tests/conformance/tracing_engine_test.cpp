@@ -162,7 +162,9 @@ TEST_P(TracingEngineTest, RangesAreUsedAgain) {
 TEST_P(TracingEngineTest, AHeapHasAnEnd) {
     Tracing top = device.createTracing("too large");
     top.setInstances(1u << 24);
-    if (device.getFeatures().maxBufferSize > 4ull << 30) GTEST_SKIP() << "the heap of this device is larger";
+    if (device.getFeatures().maxBufferSize > 4ull << 30)
+        GTEST_SKIP() << "the largest top level, of 4 GiB, fits into this device's heap: buffers of "
+                     << device.getFeatures().maxBufferSize << " bytes";
     EXPECT_THAT(top.create(Tracing::TypeInstance), HasErrorId("tracing.heap"));
     const std::vector<Message> told = log.take();
     ASSERT_EQ(told.size(), 1u);

@@ -122,6 +122,7 @@ void DeviceObject::adopt(std::unique_ptr<Backend> made, MessageCallback message)
     message_ = std::move(message);
     backend = std::move(made);
     const Expected<TracingEngine> engine = askedEngine(TracingEngine::Auto);
+    if (!engine) report(engine.error());
     chooseEngine(engine ? *engine : TracingEngine::Auto, FeatureComputeTracing | FeatureFragmentTracing);
     setReady();
 }

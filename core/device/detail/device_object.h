@@ -41,9 +41,9 @@ public:
     void retire(std::unique_ptr<Native> native, const std::array<uint64_t, queue_count>& last_use);
     /// Gives an object another native one between submissions; the old one is retired.
     void replaceNative(Object& object, std::unique_ptr<Native> native);
-    /// The same if nothing but those submissions has used it; else false, and nothing happens.
     /// Software engine: the structure lies elsewhere from the submission on that is being made. Under the submit lock.
     void moveTracing(TracingObject& tracing, TracingHeap::Range range);
+    /// As replaceNative if nothing but those submissions has used the object; else false, and nothing happens.
     bool replaceUnused(Object& object, std::unique_ptr<Native>& native, const std::array<uint64_t, queue_count>& known);
     std::array<uint64_t, queue_count> lastUse(const Object& object);
     /// Deletes what the GPU has passed.

@@ -196,10 +196,14 @@ Status DeviceObject::buildOnHost(std::span<TracingObject* const> tracings, Where
         made->range = std::move(*range);
         made->memory = made->range.texels * sizeof(Texel);
         replaceNative(*tracing, std::move(made));
-        if (Status status = upload(*tracing, *hierarchy, where); !status) return status;
-        std::lock_guard lock(submit_mutex_);
-        tracing->moves++;
-        tracing->built = true;
+        const Status uploaded = upload(*tracing, *hierarchy, where);
+        {
+            // Also without the upload: the place is another one, and nothing has been built there.
+            std::lock_guard lock(submit_mutex_);
+            tracing->moves++;
+            tracing->built = static_cast<bool>(uploaded);
+        }
+        if (!uploaded) return uploaded;
     }
     return {};
 }

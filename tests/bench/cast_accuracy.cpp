@@ -1,4 +1,4 @@
-// cast.*: hits of the driver's ray queries, as RayCaster and `glint cast` give them, against float64, with Embree
+// cast.*: hits of both engines' ray queries, as RayCaster and `glint cast` give them, against float64, with Embree
 // beside them. docs/accuracy.md says what the figures mean; `./dev report` makes its tables and charts from what is
 // written.
 
@@ -29,10 +29,30 @@ constexpr uint32_t leak_rays = 131072;
 struct Tracer {
     std::string name;
     std::string suffix;
+    std::string device;
     std::function<std::vector<RayHit>(const Mesh& mesh, std::span<const Ray> rays, double& seconds)> cast;
 };
 
-std::vector<Tracer> tracers(const Device& device) {
+std::vector<Tracer> tracers() {
+    std::vector<Tracer> list;
+    for (const TracingEngine engine : {TracingEngine::Software, TracingEngine::Driver}) {
+        const Device device = createDevice(engine);
+        const bool is_driver = engine == TracingEngine::Driver;
+        if (!device.getFeatures().computeTracing) {
+            fmt::print("  left out: the driver of {} has no ray queries\n", device.getInfo().name);
+            continue;
+        }
+        list.push_back({is_driver ? "driver" : "Glint's engine", is_driver ? ".driver" : "", deviceName(device),
+                        [device](const Mesh& mesh, std::span<const Ray> rays, double& seconds) {
+                            RayCaster caster = std::move(*check(RayCaster::create(device, mesh)));
+                            // The shader is compiled at its first dispatch.
+                            check(caster.cast(rays.first(1)));
+                            const double begin = wallSeconds();
+                            std::vector<RayHit> hits = std::move(*check(caster.cast(rays)));
+                            seconds = wallSeconds() - begin;
+                            return hits;
+                        }});
+    }
     const auto embree = [](EmbreeMode mode) {
         return [mode](const Mesh& mesh, std::span<const Ray> rays, double& seconds) {
             const test::EmbreeScene scene(mesh, mode);
@@ -42,20 +62,9 @@ std::vector<Tracer> tracers(const Device& device) {
             return hits;
         };
     };
-    return {
-        {"driver", "",
-         [device](const Mesh& mesh, std::span<const Ray> rays, double& seconds) {
-             RayCaster caster = std::move(*check(RayCaster::create(device, mesh)));
-             // The shader is compiled at its first dispatch.
-             check(caster.cast(rays.first(1)));
-             const double begin = wallSeconds();
-             std::vector<RayHit> hits = std::move(*check(caster.cast(rays)));
-             seconds = wallSeconds() - begin;
-             return hits;
-         }},
-        {"Embree", ".embree", embree(EmbreeMode::Fast)},
-        {"Embree, robust", ".embree_robust", embree(EmbreeMode::Robust)},
-    };
+    list.push_back({"Embree", ".embree", test::embreeName(), embree(EmbreeMode::Fast)});
+    list.push_back({"Embree, robust", ".embree_robust", test::embreeName(), embree(EmbreeMode::Robust)});
+    return list;
 }
 
 /// The share of hits whose error is larger, over the error: one line each, at most 400 of them.
@@ -90,8 +99,7 @@ std::vector<Scene> scenes() {
     return list;
 }
 
-void compareScene(Report& report, const Scene& scene, std::span<const Tracer> list, const std::string& device,
-                  std::string& table) {
+void compareScene(Report& report, const Scene& scene, std::span<const Tracer> list, std::string& table) {
     const std::vector<Ray> rays = test::raysAround(scene.mesh, ray_count);
     const test::ReferenceHierarchy reference(scene.mesh);
     for (const Tracer& tracer : list) {
@@ -107,14 +115,14 @@ void compareScene(Report& report, const Scene& scene, std::span<const Tracer> li
                         HitComparison::quantile(result.place_errors, 0.9999), ray_count / seconds * 1e-6);
         const std::string prefix = "cast." + scene.name;
         report.add(prefix + ".t_error_p9999" + tracer.suffix, quantile(0.9999), "of |origin| + t |direction|",
-                   "float64 hierarchy", tracer.suffix.empty() ? device : test::embreeName());
+                   "float64 hierarchy", tracer.device);
         report.add(prefix + ".wrong" + tracer.suffix, static_cast<double>(result.wrong), "rays", "float64 hierarchy",
-                   tracer.suffix.empty() ? device : test::embreeName());
+                   tracer.device);
         writeCurve(report.folder() / fmt::format("t_error_{}{}.dat", scene.name, tracer.suffix), result.t_errors);
     }
 }
 
-void countLeaks(Report& report, std::span<const Tracer> list, const std::string& device, std::string& table) {
+void countLeaks(Report& report, std::span<const Tracer> list, std::string& table) {
     const Mesh sphere = createSphere(1.0f, 5);
     const auto at_corners = test::raysAtCorners(sphere, leak_rays, 0.5);
     const auto at_edges = test::raysAtEdges(sphere, leak_rays, 0.5);
@@ -127,35 +135,29 @@ void countLeaks(Report& report, std::span<const Tracer> list, const std::string&
                 std::count_if(hits.begin(), hits.end(), [](const RayHit& hit) { return !hit.isHit(); }));
             report.add(fmt::format("cast.leaks_{}{}", i == 0 ? "corners" : "edges", tracer.suffix),
                        static_cast<double>(leaks[i]), fmt::format("of {} rays", leak_rays), "a closed mesh: none",
-                       tracer.suffix.empty() ? device : test::embreeName());
+                       tracer.device);
         }
         table += fmt::format("| {} | {} | {} |\n", tracer.name, leaks[0], leaks[1]);
     }
 }
 
 void run(Report& report) {
-    const Device device = createDevice();
-    if (!device.getFeatures().computeTracing) {
-        fmt::print("  left out: {} has no ray queries\n\n", device.getInfo().name);
-        return;
-    }
-    const std::string name = deviceName(device);
-    const std::vector<Tracer> list = tracers(device);
-    const std::string machine = fmt::format("{}; {}, one thread.\n\n", name, test::embreeName());
+    const std::vector<Tracer> list = tracers();
+    const std::string machine = fmt::format("{}; {}, one thread.\n\n", list.front().device, test::embreeName());
     std::string table = machine +
                         "| mesh | tracer | hits | differ | wrong | t error, median | 99 % | 99.99 % | largest | of its "
                         "bound | place, 99.99 % | million rays a second |\n"
                         "|---|---|---|---|---|---|---|---|---|---|---|---|\n";
-    for (const Scene& scene : scenes()) compareScene(report, scene, list, name, table);
+    for (const Scene& scene : scenes()) compareScene(report, scene, list, table);
     check(writeTextFile(report.folder() / "hits.md", table));
     std::string leaks = machine + "| tracer | aimed at corners | aimed at edges |\n|---|---|---|\n";
-    countLeaks(report, list, name, leaks);
+    countLeaks(report, list, leaks);
     check(writeTextFile(report.folder() / "leaks.md", leaks));
 }
 
 std::vector<std::string> figureNames() {
     std::vector<std::string> names;
-    for (const char* suffix : {"", ".embree", ".embree_robust"})
+    for (const char* suffix : {"", ".driver", ".embree", ".embree_robust"})
         for (const char* figure : {"bunny.t_error_p9999", "bunny.wrong", "torus_100k.t_error_p9999", "torus_100k.wrong",
                                    "leaks_corners", "leaks_edges"})
             names.push_back(fmt::format("cast.{}{}", figure, suffix));

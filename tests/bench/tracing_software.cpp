@@ -193,7 +193,8 @@ void runLeaks(Report& report) {
     test::SeamLeaks driver;
     test::SeamLeaks embree;
     test::SeamLeaks robust;
-    const bool has_driver = device.getFeatures().computeTracing;
+    const Device driver_device = createDevice(TracingEngine::Driver);
+    const bool has_driver = driver_device.getFeatures().computeTracing;
     for (size_t i = 0; i < meshes.size(); i++) {
         const test::ClosedMesh& mesh = meshes[i];
         const uint64_t seed = (i + 1) << 32;
@@ -209,7 +210,7 @@ void runLeaks(Report& report) {
         std::string line = fmt::format("  {:<14} {:>6} triangles: {} of {} rays leak", mesh.name,
                                        mesh.mesh.triangleCount(), found.all(), share(rays));
         if (has_driver) {
-            RayCaster caster = std::move(*check(RayCaster::create(device, mesh.mesh)));
+            RayCaster caster = std::move(*check(RayCaster::create(driver_device, mesh.mesh)));
             const test::SeamLeaks theirs = seamLeaks(mesh, share(driver_rays), seed, [&](std::span<const Ray> some) {
                 return std::move(*check(caster.cast(some)));
             });

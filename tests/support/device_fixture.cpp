@@ -29,17 +29,19 @@ struct Shared {
 
 class SharedDevices : public ::testing::Environment {
 public:
-    Shared& get(const std::string& api) {
-        const auto [place, fresh] = devices_.try_emplace(api);
+    Shared& get(const std::string& api, TracingEngine tracing) {
+        const auto [place, fresh] = devices_.try_emplace({api, tracing});
         Shared& shared = place->second;
         if (fresh)
-            shared.device = Device::create(
-                {.api = api, .validation = DeviceDesc::Validation::On, .message = shared.log.callback()});
+            shared.device = Device::create({.api = api,
+                                            .tracing = tracing,
+                                            .validation = DeviceDesc::Validation::On,
+                                            .message = shared.log.callback()});
         return shared;
     }
 
     void TearDown() override {
-        for (auto& [api, shared] : devices_) {
+        for (auto& [key, shared] : devices_) {
             shared.device = {};
             shared.log.expectNone();
         }
@@ -47,7 +49,7 @@ public:
     }
 
 private:
-    std::map<std::string, Shared> devices_;
+    std::map<std::pair<std::string, TracingEngine>, Shared> devices_;
 };
 
 // GoogleTest owns it and takes it down before the drivers are unloaded.
@@ -59,12 +61,12 @@ SharedDevices* const environment = [] {
 
 }  // namespace
 
-Device sharedDevice(const std::string& api) { return environment->get(api).device; }
-MessageLog sharedLog(const std::string& api) { return environment->get(api).log; }
+Device sharedDevice(const std::string& api, TracingEngine tracing) { return environment->get(api, tracing).device; }
+MessageLog sharedLog(const std::string& api, TracingEngine tracing) { return environment->get(api, tracing).log; }
 
 void DeviceTest::SetUp() {
-    device = sharedDevice(api_);
-    log = sharedLog(api_);
+    device = sharedDevice(api_, tracing_);
+    log = sharedLog(api_, tracing_);
     ASSERT_TRUE(device) << "no device, no test: " << device.error().text();
     log.expectNone();
 }

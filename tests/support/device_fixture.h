@@ -35,19 +35,21 @@ private:
 
 /// A device with validation and all features of the adapter, opened once a process and closed after the last test: what
 /// the layers say about objects still alive then is a failure, too. A device that cannot be opened carries the error.
-Device sharedDevice(const std::string& api);
+Device sharedDevice(const std::string& api, TracingEngine tracing = TracingEngine::Auto);
 /// The log of a shared device.
-MessageLog sharedLog(const std::string& api);
+MessageLog sharedLog(const std::string& api, TracingEngine tracing = TracingEngine::Auto);
 
 /// In a test's body or SetUp: skips it where the adapter lacks a feature, and says which.
 #define GLINT_NEED_FEATURE(feature)                   \
     if (device && !device.getFeatures().has(feature)) \
     GTEST_SKIP() << "'" << device.getInfo().name << "' lacks " << ::glint::toString(feature)
 
-/// A test with a device. It fails if there is none, and if the device tells anything that the test did not ask for.
+/// A test with a device; with the driver's engine where it is about what the driver itself answers. It fails if there
+/// is none, and if the device tells anything that the test did not ask for.
 class DeviceTest : public ::testing::Test {
 protected:
-    explicit DeviceTest(std::string api = "vulkan") : api_(std::move(api)) {}
+    explicit DeviceTest(std::string api = "vulkan", TracingEngine tracing = TracingEngine::Auto)
+        : api_(std::move(api)), tracing_(tracing) {}
 
     void SetUp() override;
     void TearDown() override;
@@ -69,6 +71,7 @@ protected:
 
 private:
     const std::string api_;
+    const TracingEngine tracing_;
 };
 
 }  // namespace glint::test

@@ -20,6 +20,8 @@ namespace {
 
 class RayHelpers : public DeviceTest {
 protected:
+    RayHelpers() : DeviceTest("vulkan", TracingEngine::Driver) {}
+
     /// Runs a body for each engine that the device has, with the number of rays that suits its speed.
     template <class Body>
     void withEngines(const Body& body) {

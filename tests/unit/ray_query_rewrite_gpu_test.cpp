@@ -124,6 +124,8 @@ void main() {
 
 class RewriteGpuTest : public ConformanceTest {
 protected:
+    RewriteGpuTest() : ConformanceTest("vulkan", TracingEngine::Driver) {}
+
     void SetUp() override {
         ConformanceTest::SetUp();
         GLINT_NEED_FEATURE(FeatureComputeTracing);

@@ -49,6 +49,12 @@ void glintQueryTerminate(inout GlintQuery query) {
     query.inside = false;
 }
 
+// Whether the instance is there for the ray.
+bool glintQuerySees(GlintQuery query, GlintInstance instance) {
+    const uint skipped = instance.kind == GLINT_KIND_BOXES ? GLINT_RAY_SKIP_BOXES : GLINT_RAY_SKIP_TRIANGLES;
+    return (instance.mask & query.mask) != 0u && (query.flags & skipped) == 0u;
+}
+
 void glintQueryInitialize(out GlintQuery query, uint number, uint top, uint flags, uint mask, vec3 origin, float t_min,
                           vec3 direction, float t_max) {
     query.number = number;
@@ -59,17 +65,29 @@ void glintQueryInitialize(out GlintQuery query, uint number, uint top, uint flag
     query.direction = direction;
     query.candidate = GlintIntersection(GLINT_CANDIDATE_TRIANGLE, 0.0, vec2(0.0), 0u, 0u, 0u, false, false);
     query.committed = GlintIntersection(GLINT_COMMITTED_NONE, t_max, vec2(0.0), 0u, 0u, 0u, false, false);
-    query.top = glintSpace(top, origin, direction);
-    query.space = query.top;
     query.instance = GlintInstance(0u, 0u, 0u, 0u, 0u, 0u);
     glintQueryTerminate(query);
-    if (glintIsRay(origin, direction, t_min, t_max)) glintBegin(query.way);
+    bool goes = glintIsRay(origin, direction, t_min, t_max);
+    // A lone instance is where the way begins: there is nothing to find on the level above.
+    const uvec4 places = GLINT_TRACING_LOAD(top + 1u);
+    uint base = top;
+    if (places.w == 1u) {
+        query.instance = glintInstance(top, GLINT_TRACING_LOAD(top + places.z + 2u).y);
+        query.inside = goes && glintQuerySees(query, query.instance);
+        goes = query.inside;
+        base = query.instance.base;
+        origin = glintToObject(query.instance.texel, origin, true);
+        direction = glintToObject(query.instance.texel, direction, false);
+    }
+    query.space = glintSpace(base, origin, direction);
+    query.top = query.space;
+    query.top.base = top;
+    if (goes) glintBegin(query.way);
 }
 
 void glintQueryEnterInstance(inout GlintQuery query) {
     query.instance = glintInstanceAt(query.top, query.way);
-    const uint skipped = query.instance.kind == GLINT_KIND_BOXES ? GLINT_RAY_SKIP_BOXES : GLINT_RAY_SKIP_TRIANGLES;
-    if ((query.instance.mask & query.mask) == 0u || (query.flags & skipped) != 0u) {
+    if (!glintQuerySees(query, query.instance)) {
         glintNext(query.way, query.number, query.top.base);
         return;
     }

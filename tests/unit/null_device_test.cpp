@@ -106,6 +106,14 @@ TEST_F(NullDevice, LacksWhatItIsTold) {
     ASSERT_TRUE(device);
     EXPECT_EQ(device.getFeatures().tracingEngine, TracingEngine::Driver);
     EXPECT_THAT(device.getInfo().tracing, testing::HasSubstr("driver"));
+    // Also where that is all that was asked for.
+    const Device queries = Device::create({.api = "null",
+                                           .required = FeatureComputeTracing,
+                                           .optional = 0,
+                                           .tracing = TracingEngine::Auto});
+    ASSERT_TRUE(queries);
+    EXPECT_EQ(queries.getFeatures().tracingEngine, TracingEngine::Driver);
+    EXPECT_TRUE(queries.getFeatures().computeTracing);
     const Device other = Device::create({.api = "null", .adapter = "llvmpipe", .message = [](const Message&) {}});
     EXPECT_THAT(other, HasErrorId("device.no_adapter"));
 }

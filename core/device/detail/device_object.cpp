@@ -80,6 +80,7 @@ Status DeviceObject::open(const DeviceDesc& desc, Where where) {
     if (!engine) return fail(engine.error());
     // What Glint provides itself, no driver has to.
     constexpr FeatureMask queries = FeatureComputeTracing | FeatureFragmentTracing;
+    if (*engine == TracingEngine::Auto) backend_desc.optional |= desc.required & queries;
     if (*engine != TracingEngine::Driver) backend_desc.required &= ~queries;
     if (*engine == TracingEngine::Software) backend_desc.optional &= ~queries;
     Expected<std::unique_ptr<Backend>> made = createBackend(desc.api, backend_desc);

@@ -30,6 +30,7 @@ layout(set = 0, binding = 1) uniform GlintBatch {
 
 #include <glint/tracing/memory.h>
 #include <glint/tracing/ray_query.h>
+#include <glint/tracing/ray_records.h>
 #include <glint/tracing/traversal.h>
 
 #if GLINT_TRACING_REFILL && GLINT_TRACING_LEVELS == 2
@@ -42,24 +43,6 @@ layout(set = 0, binding = 1) uniform GlintBatch {
 
 layout(local_size_x = 64) in;
 
-struct GlintRay {
-    vec3 origin;
-    float t_min;
-    vec3 direction;
-    float t_max;
-};
-
-struct GlintHit {
-    float t;  // infinity if there is none
-    uint primitive;
-    uint geometry;
-    float u;  // of the second corner
-    float v;  // of the third
-    uint front;
-    uint instance;
-    uint unused;
-};
-
 layout(set = 0, binding = 2) readonly buffer GlintRays { GlintRay rays[]; };
 layout(set = 0, binding = 3) writeonly buffer GlintHits { GlintHit hits[]; };
 
@@ -71,10 +54,10 @@ struct GlintClosest {
     uint instance;
 };
 
-GlintWay glintBeginRay(GlintRay ray, out GlintClosest closest) {
+GlintWay glintBeginRay(GlintRay ray, bool means_something, out GlintClosest closest) {
     GlintWay way;
     glintEnd(way);
-    if (glintIsRay(ray.origin, ray.direction, ray.t_min, ray.t_max)) glintBegin(way);
+    if (means_something) glintBegin(way);
     closest = GlintClosest(ray.t_max, false, GlintTriangleHit(0.0, 1.0, vec3(0.0), 0u, 0u), 0u);
     return way;
 }
@@ -92,19 +75,19 @@ void glintStep(inout GlintWay way, GlintSpace space, uint instance, float t_min,
     }
 }
 
-void glintStore(uint ray, GlintClosest closest) {
+void glintStore(uint ray, GlintClosest closest, float scale) {
     const bool found = closest.found;
     bool front = closest.hit.area < 0.0;
 #if GLINT_TRACING_LEVELS == 2
     if (found && (glintInstance(hierarchy, closest.instance).flags & GLINT_INSTANCE_FLIP_FACING) != 0u) front = !front;
 #endif
-    hits[ray].t = found ? closest.t : uintBitsToFloat(0x7f800000u);
-    hits[ray].primitive = found ? closest.hit.primitive : 0xffffffffu;
-    hits[ray].geometry = found ? closest.hit.geometry & 0x7fffffffu : 0xffffffffu;
+    hits[ray].t = found ? closest.t * scale : uintBitsToFloat(GLINT_INFINITY);
+    hits[ray].primitive = found ? closest.hit.primitive : GLINT_NO_HIT;
+    hits[ray].geometry = found ? closest.hit.geometry & 0x7fffffffu : GLINT_NO_HIT;
     hits[ray].u = found ? closest.hit.weights.y / closest.hit.area : 0.0;
     hits[ray].v = found ? closest.hit.weights.z / closest.hit.area : 0.0;
     hits[ray].front = found && front ? 1u : 0u;
-    hits[ray].instance = found ? closest.instance : 0xffffffffu;
+    hits[ray].instance = found ? closest.instance : GLINT_NO_HIT;
 }
 
 #if GLINT_TRACING_REFILL
@@ -117,6 +100,7 @@ void main() {
     uint index = 0xffffffffu;
     GlintSpace space;
     float t_min;
+    float scale;
     GlintClosest closest;
     GlintWay way;
     glintEnd(way);
@@ -127,14 +111,15 @@ void main() {
         const bool all_idle = idle_count == gl_SubgroupSize;
         if (next < end ? idle_count * 2u >= gl_SubgroupSize : all_idle) {
             if (idle) {
-                if (index < ray_count) glintStore(index, closest);
+                if (index < ray_count) glintStore(index, closest, scale);
                 index = next + subgroupBallotExclusiveBitCount(idles);
                 if (index >= end) index = 0xffffffffu;
                 if (index < end) {
-                    const GlintRay ray = rays[index];
+                    GlintRay ray = rays[index];
+                    scale = glintScale(ray);
                     space = glintSpace(hierarchy, ray.origin, ray.direction);
-                    t_min = max(ray.t_min, 0.0);
-                    way = glintBeginRay(ray, closest);
+                    t_min = ray.t_min;
+                    way = glintBeginRay(ray, scale != 0.0, closest);
                 }
             }
             if (next >= end) return;
@@ -149,11 +134,12 @@ void main() {
 void main() {
     const uint index = gl_GlobalInvocationID.x;
     if (index >= ray_count) return;
-    const GlintRay ray = rays[index];
-    const float t_min = max(ray.t_min, 0.0);
+    GlintRay ray = rays[index];
+    const float scale = glintScale(ray);
+    const float t_min = ray.t_min;
     const GlintSpace space = glintSpace(hierarchy, ray.origin, ray.direction);
     GlintClosest closest;
-    GlintWay way = glintBeginRay(ray, closest);
+    GlintWay way = glintBeginRay(ray, scale != 0.0, closest);
 #if GLINT_TRACING_LEVELS == 1
     while (glintUnderway(way)) glintStep(way, space, 0u, t_min, closest);
 #else
@@ -179,7 +165,7 @@ void main() {
         }
     }
 #endif
-    glintStore(index, closest);
+    glintStore(index, closest, scale);
 }
 
 #endif

@@ -16,13 +16,6 @@
 
 namespace glint::bench {
 
-/// A hit as the kernel of shaders/tracing/batch.h writes it.
-struct BatchHit {
-    RayHit hit;
-    uint32_t unused = 0;
-};
-static_assert(sizeof(BatchHit) == 32);
-
 /// A kernel over one set of rays, whose slots are those of shaders/tracing/batch.h.
 class RayBatch {
 public:
@@ -34,7 +27,7 @@ public:
           structure_(structure),
           count_(static_cast<uint32_t>(rays.size())),
           rays_(device_.createBuffer(Buffer::FlagStorage, rays)),
-          hits_(device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit))) {}
+          hits_(device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(RayHit))) {}
 
     uint32_t size() const { return count_; }
 
@@ -52,12 +45,7 @@ public:
         check(device_.finish());
     }
 
-    std::vector<RayHit> hits() {
-        const auto all = *check(device_.read<BatchHit>(hits_));
-        std::vector<RayHit> hits(all.size());
-        std::transform(all.begin(), all.end(), hits.begin(), [](const BatchHit& each) { return each.hit; });
-        return hits;
-    }
+    std::vector<RayHit> hits() { return *check(device_.read<RayHit>(hits_)); }
 
 private:
     Device device_;
@@ -96,7 +84,7 @@ layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
 
 layout(local_size_x = 64) in;
 struct Ray { vec3 origin; float t_min; vec3 direction; float t_max; };
-struct Hit { float t; uint primitive, geometry; float u, v; uint front, instance, unused; };
+struct Hit { float t; uint primitive, geometry; float u, v; uint front, instance; };
 layout(set = 0, binding = 1) uniform Parameters { uint ray_count; };
 layout(set = 0, binding = 2) readonly buffer Rays { Ray rays[]; };
 layout(set = 0, binding = 3) writeonly buffer Hits { Hit hits[]; };
@@ -108,11 +96,11 @@ void main() {
     QUERY query;
     START(query, 1u, 0xffu, ray.origin, ray.t_min, ray.direction, ray.t_max);
     while (PROCEED(query)) {}
-    Hit hit = Hit(uintBitsToFloat(0x7f800000u), 0xffffffffu, 0xffffffffu, 0.0, 0.0, 0u, 0xffffffffu, 0u);
+    Hit hit = Hit(uintBitsToFloat(0x7f800000u), 0xffffffffu, 0xffffffffu, 0.0, 0.0, 0u, 0xffffffffu);
     if (uint(TYPE(query, true)) != 0u) {
         const vec2 at = BARYCENTRICS(query, true);
         hit = Hit(DISTANCE(query, true), uint(PRIMITIVE(query, true)), 0u, at.x, at.y, FRONT(query, true) ? 1u : 0u,
-                  uint(INSTANCE(query, true)), 0u);
+                  uint(INSTANCE(query, true)));
     }
     hits[index] = hit;
 }

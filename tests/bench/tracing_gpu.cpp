@@ -65,7 +65,7 @@ public:
         return static_cast<double>(*check(device_.getTime(query_))) * 1e-9;
     }
 
-    std::vector<BatchHit> hits() { return *check(device_.read<BatchHit>(hits_, 0, count_)); }
+    std::vector<RayHit> hits() { return *check(device_.read<RayHit>(hits_, 0, count_)); }
 
 private:
     Device device_;
@@ -78,7 +78,7 @@ private:
 };
 
 /// How far inside of a triangle a ray passes, in units of the world; negative outside.
-double insideBy(const TracingScene& scene, const BatchHit& hit, const Ray& ray) {
+double insideBy(const TracingScene& scene, const RayHit& hit, const Ray& ray) {
     const Vector3d direction = glm::normalize(Vector3d(ray.direction));
     const Vector3d helper = std::abs(direction.x) < 0.5 ? Vector3d(1, 0, 0) : Vector3d(0, 1, 0);
     const Vector3d x = glm::normalize(glm::cross(direction, helper));
@@ -86,9 +86,9 @@ double insideBy(const TracingScene& scene, const BatchHit& hit, const Ray& ray) 
     double px[3];
     double py[3];
     for (size_t c = 0; c < 3; c++) {
-        Vector3d corner(scene.mesh.positions[scene.mesh.indices[3 * size_t(hit.hit.primitive) + c]]);
+        Vector3d corner(scene.mesh.positions[scene.mesh.indices[3 * size_t(hit.primitive) + c]]);
         if (!scene.instances.empty()) {
-            const auto& m = scene.instances[hit.hit.instance].rows;
+            const auto& m = scene.instances[hit.instance].rows;
             const Vector3d object = corner;
             for (int row = 0; row < 3; row++) {
                 const float* r = &m[size_t(4 * row)];
@@ -118,22 +118,22 @@ struct Differences {
 /// 2^-20 of their distance from the origin (docs/tracing.md), and the way to an instance's space by as much again: it
 /// is wrong if it misses a triangle nearer to the origin that a ray passes inside by more than twice that, or reports
 /// one that it passes outside of by more.
-Differences compare(const TracingScene& scene, std::span<const Ray> rays, std::span<const BatchHit> ours,
-                    std::span<const BatchHit> theirs) {
+Differences compare(const TracingScene& scene, std::span<const Ray> rays, std::span<const RayHit> ours,
+                    std::span<const RayHit> theirs) {
     Differences differences;
     for (size_t i = 0; i < rays.size(); i++) {
-        const BatchHit& a = ours[i];
-        const BatchHit& b = theirs[i];
-        if (a.hit.primitive == b.hit.primitive && a.hit.instance == b.hit.instance) continue;
+        const RayHit& a = ours[i];
+        const RayHit& b = theirs[i];
+        if (a.primitive == b.primitive && a.instance == b.instance) continue;
         differences.primitives++;
-        const double nearer = std::min(a.hit.t, b.hit.t);
-        const double farther = std::max(a.hit.t, b.hit.t);
+        const double nearer = std::min(a.t, b.t);
+        const double farther = std::max(a.t, b.t);
         if (farther - nearer <= 0x1p-13 * farther) continue;
         differences.apart++;
         const double distance = glm::length(Vector3d(rays[i].direction)) * nearer;
         const double reach = distance + glm::length(Vector3d(scene.mesh.bounds().size()));
         const double bound = 0x1p-18 * reach;
-        const bool ours_is_nearer = a.hit.t < b.hit.t;
+        const bool ours_is_nearer = a.t < b.t;
         const double inside = insideBy(scene, ours_is_nearer ? a : b, rays[i]);
         differences.wrong += (ours_is_nearer ? inside < -bound : inside > bound) ? 1 : 0;
     }
@@ -166,7 +166,7 @@ public:
     /// Returns the ratio of the first kernel's rays a second to the pipeline's.
     double run(const char* kind, std::span<const Ray> rays, std::span<const Batch::Form> forms) {
         const Buffer ray_buffer = device_.createBuffer(Buffer::FlagStorage, rays);
-        const Buffer hit_buffer = device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit));
+        const Buffer hit_buffer = device_.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(RayHit));
         const auto count = static_cast<uint32_t>(rays.size());
         std::vector<Batch> batches;
         for (Batch::Form form : forms) {
@@ -188,7 +188,7 @@ public:
         const double million = static_cast<double>(count) * 1e-6;
         fmt::print("  {} {}, {} rays, million a second\n", scene_.name, kind, count);
         fmt::print("    {:<20} {:9.2f}\n", "pipeline", million / times[0].median());
-        const std::vector<BatchHit> theirs = pipeline_->hits();
+        const std::vector<RayHit> theirs = pipeline_->hits();
         for (size_t i = 0; i < batches.size(); i++) {
             device_.clearBuffer(hit_buffer, 0x12345678u);
             batches[i].trace();

@@ -17,7 +17,7 @@ struct Payload { float t; uint primitive; uint geometry; uint front; vec2 baryce
 
 constexpr const char* generation_source = R"(
 struct Ray { vec3 origin; float t_min; vec3 direction; float t_max; };
-struct Hit { float t; uint primitive, geometry; float u, v; uint front, instance, unused; };
+struct Hit { float t; uint primitive, geometry; float u, v; uint front, instance; };
 layout(set = 0, binding = 0) uniform accelerationStructureEXT scene;
 layout(set = 0, binding = 1) readonly buffer Rays { Ray rays[]; };
 layout(set = 0, binding = 2) writeonly buffer Hits { Hit hits[]; };
@@ -27,7 +27,7 @@ void main() {
     const Ray ray = rays[index];
     traceRayEXT(scene, gl_RayFlagsOpaqueEXT, 0xff, 0, 0, 0, ray.origin, ray.t_min, ray.direction, ray.t_max, 0);
     hits[index] = Hit(payload.t, payload.primitive, payload.geometry, payload.barycentrics.x, payload.barycentrics.y,
-                      payload.front, payload.instance, 0u);
+                      payload.front, payload.instance);
 }
 )";
 
@@ -73,7 +73,7 @@ TracingPipeline::TracingPipeline(RawDevice& device, const Mesh& mesh, std::span<
     rays_program_ =
         device_.createRays(compile(ShaderStage::RayGen, generation_source), compile(ShaderStage::RayMiss, miss_source),
                            compile(ShaderStage::Closest, hit_source), bindings);
-    const size_t size = capacity * std::max(sizeof(Ray), sizeof(BatchHit));
+    const size_t size = capacity * std::max(sizeof(Ray), sizeof(RayHit));
     constexpr VkBufferUsageFlags usage =
         VK_BUFFER_USAGE_STORAGE_BUFFER_BIT | VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
     staging_ = device_.createBuffer(size, VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT, true);
@@ -208,10 +208,10 @@ double TracingPipeline::trace() {
     return static_cast<double>(ticks[1] - ticks[0]) * device_.limits().timestampPeriod * 1e-9;
 }
 
-std::vector<BatchHit> TracingPipeline::hits() {
-    std::vector<BatchHit> hits(count_);
-    copy(hits_, staging_, hits.size() * sizeof(BatchHit));
-    std::memcpy(static_cast<void*>(hits.data()), staging_.mapped, hits.size() * sizeof(BatchHit));
+std::vector<RayHit> TracingPipeline::hits() {
+    std::vector<RayHit> hits(count_);
+    copy(hits_, staging_, hits.size() * sizeof(RayHit));
+    std::memcpy(static_cast<void*>(hits.data()), staging_.mapped, hits.size() * sizeof(RayHit));
     return hits;
 }
 

@@ -24,7 +24,7 @@ public:
     void setRays(std::span<const Ray> rays);
     /// One launch. Returns the seconds that the device took for it.
     double trace();
-    std::vector<BatchHit> hits();
+    std::vector<RayHit> hits();
 
 private:
     void build(const Mesh& mesh, std::span<const Transform3x4> instances);

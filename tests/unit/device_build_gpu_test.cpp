@@ -22,14 +22,6 @@ namespace {
 
 using namespace glint::detail;
 
-/// As the kernel of batch.h writes it.
-struct BatchHit {
-    RayHit hit;
-    uint32_t unused;
-
-    bool operator==(const BatchHit&) const = default;
-};
-
 /// Towards what is in the bounds, from outside and inside.
 std::vector<Ray> raysAt(const BoundBox& bounds, uint32_t count, uint64_t seed) {
     Random random(seed);
@@ -110,7 +102,7 @@ protected:
         return fmt::format("GLINT_TRACING_MEMORY=0;GLINT_TRACING_NODES={}", static_cast<int>(GetParam()));
     }
 
-    std::vector<BatchHit> trace(const Hierarchy& hierarchy, const std::vector<Ray>& rays) {
+    std::vector<RayHit> trace(const Hierarchy& hierarchy, const std::vector<Ray>& rays) {
         if (!batch) {
             batch = device.createKernel();
             batch.createShaderGLSL("#include <glint/tracing/batch.h>\n", macros());
@@ -118,7 +110,7 @@ protected:
         }
         const Buffer texels = device.createBuffer(Buffer::FlagTexel, hierarchy.texels.data(), hierarchy.bytes());
         const Buffer ray_buffer = device.createBuffer(Buffer::FlagStorage, std::span(rays));
-        const Buffer hits = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit));
+        const Buffer hits = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(RayHit));
         device.clearBuffer(hits);
         const auto count = static_cast<uint32_t>(rays.size());
         Compute compute = device.createCompute();
@@ -128,17 +120,16 @@ protected:
         compute.setStorageBuffers(0, {ray_buffer, hits});
         compute.dispatch(count);
         EXPECT_TRUE(device.submit(compute));
-        return *device.read<BatchHit>(hits);
+        return *device.read<RayHit>(hits);
     }
 
     /// The same hits bit for bit, and some.
     void expectSameHits(const Hierarchy& a, const Hierarchy& b, uint32_t rays = 2000) {
         const BoundBox bounds = boundsOf(b);
         const std::vector<Ray> all = raysAt(bounds, rays, 17);
-        const std::vector<BatchHit> hits = trace(a, all);
+        const std::vector<RayHit> hits = trace(a, all);
         EXPECT_EQ(hits, trace(b, all));
-        EXPECT_GT(std::count_if(hits.begin(), hits.end(), [](const BatchHit& each) { return each.hit.isHit(); }),
-                  rays / 50);
+        EXPECT_GT(std::count_if(hits.begin(), hits.end(), [](const RayHit& each) { return each.isHit(); }), rays / 50);
     }
 
     /// Full nodes of the same bits, but for planes that are one float farther out: the host gives the next float on the

@@ -20,12 +20,6 @@ namespace {
 
 using namespace glint::detail;
 
-/// As the kernel of batch.h writes it.
-struct BatchHit {
-    RayHit hit;
-    uint32_t unused;
-};
-
 Ray rayTo(const Vector3d& origin, const Vector3d& target) {
     Ray ray;
     ray.origin = Vector3f(origin);
@@ -50,15 +44,11 @@ protected:
 
     std::vector<RayHit> trace(const Hierarchy& hierarchy, const std::vector<Ray>& rays, bool refill,
                               uint32_t memory = 0) {
-        std::vector<RayHit> hits;
-        for (const BatchHit& each :
-             trace(std::span(hierarchy.texels.data(), hierarchy.texels.size()), rays, 1, refill, memory))
-            hits.push_back(each.hit);
-        return hits;
+        return trace(std::span(hierarchy.texels.data(), hierarchy.texels.size()), rays, 1, refill, memory);
     }
 
-    std::vector<BatchHit> trace(std::span<const Texel> hierarchies, const std::vector<Ray>& rays, uint32_t levels,
-                                bool refill, uint32_t memory = 0) {
+    std::vector<RayHit> trace(std::span<const Texel> hierarchies, const std::vector<Ray>& rays, uint32_t levels,
+                              bool refill, uint32_t memory = 0) {
         Kernel kernel = device.createKernel();
         kernel.createShaderGLSL("#include <glint/tracing/batch.h>\n",
                                 macros(memory) +
@@ -69,7 +59,7 @@ protected:
         if (memory == 2) flags |= Buffer::FlagAddress;
         const Buffer texels = device.createBuffer(flags, hierarchies);
         const Buffer ray_buffer = device.createBuffer(Buffer::FlagStorage, std::span(rays));
-        const Buffer hit_buffer = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(BatchHit));
+        const Buffer hit_buffer = device.createBuffer(Buffer::FlagStorage, rays.size() * sizeof(RayHit));
         device.clearBuffer(hit_buffer, 0x12345678u);
         const auto count = static_cast<uint32_t>(rays.size());
         Compute compute = device.createCompute();
@@ -84,9 +74,9 @@ protected:
         compute.dispatch(refill ? (count + 3) / 4 : count);
         const Status status = device.submit(compute);
         EXPECT_TRUE(status) << status.error().text();
-        const Expected<std::vector<BatchHit>> results = device.read<BatchHit>(hit_buffer);
+        const Expected<std::vector<RayHit>> results = device.read<RayHit>(hit_buffer);
         if (!results) ADD_FAILURE() << results.error().text();
-        return results.value_or(std::vector<BatchHit>());
+        return results.value_or(std::vector<RayHit>());
     }
 };
 
@@ -641,12 +631,12 @@ TEST_P(TracingTraversal, TracesInstancesInBatches) {
     ASSERT_TRUE(device.submit(compute));
     const std::vector<QueryHit> expected = *device.read<QueryHit>(hits);
 
-    const std::vector<BatchHit> found = trace(scene, rays, 2, false);
+    const std::vector<RayHit> found = trace(scene, rays, 2, false);
     ASSERT_EQ(found.size(), expected.size());
     uint32_t met = 0;
     uint32_t twice = 0;
     for (size_t i = 0; i < rays.size(); i++) {
-        const RayHit& hit = found[i].hit;
+        const RayHit& hit = found[i];
         ASSERT_EQ(hit.isHit(), expected[i].type != 0) << "ray " << i;
         if (!hit.isHit()) continue;
         met++;
@@ -663,7 +653,7 @@ TEST_P(TracingTraversal, TracesInstancesInBatches) {
     }
     EXPECT_GT(met, rays.size() / 4);
     EXPECT_GT(twice, 20u);
-    EXPECT_FALSE(trace(sceneOf({}, {}, GetParam()), {rays[0]}, 2, false)[0].hit.isHit());
+    EXPECT_FALSE(trace(sceneOf({}, {}, GetParam()), {rays[0]}, 2, false)[0].isHit());
 }
 
 INSTANTIATE_TEST_SUITE_P(Nodes, TracingTraversal, ::testing::Values(NodeForm::Packed, NodeForm::Full),

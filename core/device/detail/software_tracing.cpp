@@ -101,6 +101,14 @@ BuildMode buildMode(Tracing::Flags flags) {
     return (flags & Tracing::FlagFastTrace) && !(flags & Tracing::FlagUpdate) ? BuildMode::Split : BuildMode::Quality;
 }
 
+std::optional<TexelHierarchy> texelHierarchy(const Tracing& tracing) {
+    auto* const object = static_cast<TracingObject*>(tracing.object());
+    TracingHeap* const heap = object->device()->heap();
+    if (!heap || heap->form() != HeapForm::Texels) return {};
+    heap->texels().retain();
+    return TexelHierarchy{Buffer(&heap->texels()), softwareOf(*object).range.first, heap->rewrite().macros};
+}
+
 Expected<std::unique_ptr<NativeTracing>> createSoftwareTracing(DeviceObject& device, const TracingObject& tracing,
                                                                std::source_location where) {
     const Expected<DeviceSizes> sizes = deviceSizes(deviceInput(tracing));

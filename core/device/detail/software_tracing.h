@@ -8,6 +8,7 @@
 #include <glint/tracing/detail/device_build.h>
 
 #include <optional>
+#include <string>
 
 namespace glint::detail {
 
@@ -32,6 +33,15 @@ Expected<std::unique_ptr<NativeTracing>> createSoftwareTracing(DeviceObject& dev
 
 /// The structure as the device builds it.
 DeviceInput deviceInput(const TracingObject& tracing);
+
+/// For a kernel that traces a structure without a query, as shaders/tracing/batch.h does.
+struct TexelHierarchy {
+    Buffer texels;
+    uint32_t first = 0;  ///< texel of the structure, until it is built anew
+    std::string macros;  ///< of the form of its nodes
+};
+/// Nothing if the driver has it, or if shaders read the heap as something else than texels.
+std::optional<TexelHierarchy> texelHierarchy(const Tracing& tracing);
 
 /// How a structure's flags have it built on the host.
 BuildMode buildMode(Tracing::Flags flags);

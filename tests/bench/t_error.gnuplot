@@ -13,6 +13,7 @@ set grid lc rgb '#dddddd'
 set key bottom left
 set arrow from 2**-24, graph 0 to 2**-24, graph 1 nohead dt 3 lc rgb '#888888'
 set label 'one rounding, 2^{-24}' at 2**-24*1.3, 0.4 left tc rgb '#666666'
-plot data.'.dat' with lines lw 2 lc rgb '#d1495b' title 'driver', \
+plot data.'.dat' with lines lw 2 lc rgb '#d1495b' title "Glint's engine", \
+     data.'.driver.dat' with lines lw 2 dt 2 lc rgb '#edae49' title 'driver', \
      data.'.embree.dat' with lines lw 2 lc rgb '#00798c' title 'Embree', \
      data.'.embree_robust.dat' with lines lw 2 dt 2 lc rgb '#30638e' title 'Embree, robust'

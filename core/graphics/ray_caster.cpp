@@ -218,6 +218,7 @@ Status RayCaster::State::build(std::span<const MeshInstance> unsorted) {
     }
     scene = device.createTracing(records, Tracing::FlagFastTrace, "ray caster: instances");
     std::vector<Tracing> tracings;
+    tracings.reserve(models.size() + 1);
     for (const Model& model : models) tracings.push_back(model.tracing);
     tracings.push_back(scene);
     if (Status status = device.buildTracings(tracings, Buffer()); !status) return status;

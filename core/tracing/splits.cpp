@@ -123,7 +123,7 @@ void cutAll(const float values[9], const PrimRef& whole, const Box& box, uint32_
     if (halves.pay) {
         const double below = halves.below.longest();
         const double share = below / (below + halves.above.longest());
-        const auto first = std::min(cuts - 1, static_cast<uint32_t>(share * (cuts - 1) + 0.5));
+        const auto first = std::min(cuts - 1, static_cast<uint32_t>(std::lround(share * (cuts - 1))));
         cutAll(values, whole, halves.below, first, scene, pieces);
         cutAll(values, whole, halves.above, cuts - 1 - first, scene, pieces);
         return;

@@ -47,7 +47,7 @@ private:
             return staging.error();
         }
         BufferObject& memory = **staging;
-        const Status copied = device_.playNow("read-back", where_, [&](RecorderCore& core) {
+        Status copied = device_.playNow("read-back", where_, [&](RecorderCore& core) {
             core.copyBuffer(memory, 0, buffer, 0, buffer.size);
             core.hostRead(memory);
         });
@@ -204,7 +204,7 @@ Status DeviceObject::buildOnHost(std::span<TracingObject* const> tracings, Where
         made->range = std::move(*range);
         made->memory = made->range.texels * sizeof(Texel);
         replaceNative(*tracing, std::move(made));
-        const Status uploaded = upload(*tracing, *hierarchy, where);
+        Status uploaded = upload(*tracing, *hierarchy, where);
         {
             // Also without the upload: the place is another one, and nothing has been built there.
             std::lock_guard lock(submit_mutex_);

@@ -185,7 +185,7 @@ Status TracingHeap::grow(uint64_t texels, Where where) {
         std::array<uint64_t, queue_count> known = {};
         do {
             known = device_.lastUse(*texels_);
-            const Status copied = device_.playNow("growth of the heap", where, [&](RecorderCore& core) {
+            Status copied = device_.playNow("growth of the heap", where, [&](RecorderCore& core) {
                 core.copyBuffer(*next, 0, *texels_, 0, old * texel_size);
             });
             if (!copied) return copied;

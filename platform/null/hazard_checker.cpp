@@ -93,6 +93,7 @@ const char* toString(CommandType type) {
     switch (type) {
         case CommandType::Dispatch: return "dispatch";
         case CommandType::DispatchIndirect: return "indirect dispatch";
+        case CommandType::SideDispatches: return "dispatches";
         case CommandType::BeginTarget: return "begin of target";
         case CommandType::EndTarget: return "end of target";
         case CommandType::Draw: return "draw";
@@ -291,6 +292,9 @@ void HazardChecker::judgeCommand(Now& now, const CommandHeader& header) {
             if (!now.regions.empty()) now.regions.pop_back();
             now.place = place(now);
             break;
+        case CommandType::SideDispatches:
+            judgeSides(now, reinterpret_cast<const SideDispatchesCommand&>(header));
+            break;
         default: break;
     }
     now.accesses.clear();
@@ -319,6 +323,38 @@ void HazardChecker::judgeCommand(Now& now, const CommandHeader& header) {
         now.target = nullptr;
         now.target_id = 0;
         now.attachments.clear();
+    }
+}
+
+void HazardChecker::judgeSides(Now& now, const SideDispatchesCommand& command) {
+    struct Part {
+        uint32_t dispatch;
+        bool is_written;
+        ByteRange range;
+        bool meets(const Part& other) const {
+            return dispatch != other.dispatch && (is_written || other.is_written) && range.meets(other.range);
+        }
+    };
+    const CommandList& list = *now.list;
+    std::map<uint32_t, std::vector<Part>> parts;
+    for (uint32_t i = 0; i < command.count; i++) {
+        const SideDispatch& dispatch = list.at<SideDispatch>(command.dispatches)[i];
+        for (const Access& one : std::span(list.accesses).subspan(dispatch.first_access, dispatch.access_count))
+            parts[one.resource].push_back(
+                {i, (one.flags & AccessWrite) != 0, touchedRange(list, dispatch, one.resource)});
+    }
+    for (const auto& [resource, all] : parts) {
+        if (std::ranges::none_of(all, &Part::is_written)) continue;
+        for (size_t i = 0; i < all.size(); i++) {
+            const auto met = std::find_if(all.begin(), all.begin() + static_cast<std::ptrdiff_t>(i),
+                                          [&](const Part& before) { return before.meets(all[i]); });
+            if (met == all.begin() + static_cast<std::ptrdiff_t>(i)) continue;
+            report(now, "hazard.side_by_side", resource,
+                   fmt::format("{}: number {} {} what number {} {}, and they run side by side", describe(now.site),
+                               all[i].dispatch, all[i].is_written ? "writes" : "reads", met->dispatch,
+                               met->is_written ? "writes" : "reads"));
+            break;
+        }
     }
 }
 

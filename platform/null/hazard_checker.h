@@ -13,6 +13,7 @@
 // - A transition reads and writes its slice, between its source and its destination stages.
 // - Attachments of one target need no order among themselves until the target is split.
 // - Untracked commands do not conflict over parts of a buffer that are apart.
+// - Dispatches of one command are not ordered at all; so they must not conflict, but may over parts of a buffer.
 //
 // For each stage of each queue clocks say how far every stage of every queue is ordered before it, and how far what
 // they wrote is available and visible to it. An access is compared with the last write and with the reads since then.
@@ -62,8 +63,8 @@ public:
     /// "hazard.write_after_write"; "hazard.layout" (an access or a transition expects another layout),
     /// "hazard.split" (a barrier within a target that does not split it, or a split outside), "hazard.feedback" (a draw
     /// accesses an attachment of its target), "hazard.discard" (what is read was dropped by a transition from
-    /// Undefined). The code is InvalidArgument if the later command is untracked, else Internal. What was found once is
-    /// taken for ordered from there on.
+    /// Undefined), "hazard.side_by_side" (dispatches of one command conflict). The code is InvalidArgument if the later
+    /// command is untracked, else Internal. What was found once is taken for ordered from there on.
     std::vector<Error> judge(const detail::Submission& submission);
 
     /// The memory with this id is gone.
@@ -144,6 +145,7 @@ private:
     void signal(QueueState& queue, Queue kind, uint64_t value);
     void judgeList(Now& now, const detail::ResolvedList& list);
     void judgeCommand(Now& now, const detail::CommandHeader& header);
+    void judgeSides(Now& now, const detail::SideDispatchesCommand& command);
     void judgeBarrier(Now& now, const detail::Barrier& barrier, std::span<const detail::ImageBarrier> images);
     void transition(Now& now, const detail::ImageBarrier& image, const Scope& source);
     void access(Now& now, std::span<const detail::Access> accesses);

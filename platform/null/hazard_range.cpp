@@ -71,4 +71,12 @@ ByteRange touchedRange(const CommandList& list, const CommandHeader& header, uin
     return {};
 }
 
+ByteRange touchedRange(const CommandList& list, const SideDispatch& dispatch, uint32_t resource) {
+    ByteRange range{UINT64_MAX, 0};
+    const Bindings& bindings = dispatch.bindings;
+    for (const BoundResource& one : std::span(list.at<BoundResource>(bindings.bound), bindings.bound_count))
+        if (one.resource == resource) range = join(range, {one.offset, one.offset + one.size});
+    return range.begin < range.end ? range : ByteRange{};
+}
+
 }  // namespace glint::null

@@ -18,4 +18,7 @@ struct ByteRange {
 /// which is what Glint orders by; who looks after hazards himself may let commands share a buffer.
 ByteRange touchedRange(const detail::CommandList& list, const detail::CommandHeader& header, uint32_t resource);
 
+/// The same of one dispatch of several.
+ByteRange touchedRange(const detail::CommandList& list, const detail::SideDispatch& dispatch, uint32_t resource);
+
 }  // namespace glint::null

@@ -24,6 +24,7 @@ public:
     void check(uint32_t index, const CommandHeader& header) {
         index_ = index;
         header_ = &header;
+        shared_ = std::span(list_.accesses).subspan(header.first_shared, header.shared_count);
         switch (header.type) {
             case CommandType::Dispatch: {
                 const auto& command = as<DispatchCommand>();
@@ -34,6 +35,11 @@ public:
                 const auto& command = as<DispatchIndirectCommand>();
                 bindings(command.bindings, native<NullKernel>(command.kernel).layout);
                 need(command.buffer, Stage::Indirect, AccessRead);
+                break;
+            }
+            case CommandType::SideDispatches: {
+                const auto& command = as<SideDispatchesCommand>();
+                for (uint32_t i = 0; i < command.count; i++) side(list_.at<SideDispatch>(command.dispatches)[i]);
                 break;
             }
             case CommandType::BeginTarget: {
@@ -114,6 +120,15 @@ private:
         return static_cast<const T&>(*list_.resources[resource]->native);
     }
 
+    /// Its own accesses have to say all, and the command's have to hold them.
+    void side(const SideDispatch& dispatch) {
+        const uint32_t begin = std::max(dispatch.first_access, header_->first_shared);
+        const uint32_t end =
+            std::min(dispatch.first_access + dispatch.access_count, header_->first_shared + header_->shared_count);
+        shared_ = std::span(list_.accesses).subspan(begin, end > begin ? end - begin : 0);
+        bindings(dispatch.bindings, native<NullKernel>(dispatch.kernel).layout);
+    }
+
     void draw(const DrawState& state) {
         bindings(state.bindings, native<NullPipeline>(state.pipeline).layout);
         for (uint32_t i = 0; i < state.vertex_count; i++)
@@ -192,11 +207,8 @@ private:
                    access.slice.layer <= slice.layer &&
                    access.slice.layer + access.slice.layers >= slice.layer + slice.layers;
         };
-        const auto any = [&](uint32_t first, uint32_t count) {
-            return std::ranges::any_of(std::span(list_.accesses).subspan(first, count), declares);
-        };
-        if (any(header_->first_access, header_->access_count) || any(header_->first_shared, header_->shared_count))
-            return;
+        const auto own = std::span(list_.accesses).subspan(header_->first_access, header_->access_count);
+        if (std::ranges::any_of(own, declares) || std::ranges::any_of(shared_, declares)) return;
         std::string name = resource < list_.resources.size() ? list_.resources[resource]->label() : what;
         if (!what.empty() && name != what) name += " (" + what + ")";
         control_.report(makeError(ErrorCode::Internal, "null.undeclared",
@@ -208,6 +220,7 @@ private:
     const CommandList& list_;
     NullControl& control_;
     const CommandHeader* header_ = nullptr;
+    std::span<const Access> shared_;
     uint32_t index_ = 0;
 };
 

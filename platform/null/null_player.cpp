@@ -81,10 +81,13 @@ void NullPlayer::play(const CommandHeader& header) {
     switch (header.type) {
         case CommandType::Dispatch: {
             const auto& command = as<DispatchCommand>(header);
-            counters_.dispatches++;
-            const uint64_t groups = uint64_t(command.groups[0]) * command.groups[1] * command.groups[2];
-            statistics_[6] += groups;
-            nanoseconds_ += groups * control_.settings().group_time;
+            countDispatch(uint64_t(command.groups[0]) * command.groups[1] * command.groups[2]);
+            break;
+        }
+        case CommandType::SideDispatches: {
+            const auto& command = as<SideDispatchesCommand>(header);
+            for (uint32_t i = 0; i < command.count; i++)
+                countDispatch(list_->at<SideDispatch>(command.dispatches)[i].groups);
             break;
         }
         case CommandType::DispatchIndirect: {
@@ -136,6 +139,12 @@ void NullPlayer::play(const CommandHeader& header) {
         case CommandType::Barrier:
         case CommandType::Count: break;
     }
+}
+
+void NullPlayer::countDispatch(uint64_t groups) {
+    counters_.dispatches++;
+    statistics_[6] += groups;
+    nanoseconds_ += groups * control_.settings().group_time;
 }
 
 void NullPlayer::countDraw(uint64_t vertices, uint64_t instances) {

@@ -35,6 +35,7 @@ private:
     void beginTarget(const detail::BeginTargetCommand& command);
     void endTarget();
     void query(const detail::QueryCommand& command);
+    void countDispatch(uint64_t groups);
     void countDraw(uint64_t vertices, uint64_t instances);
 
     /// `size` bytes at `offset`, or nullptr after a complaint.

@@ -145,6 +145,7 @@ void Player::playCommand(const CommandHeader& header) {
     switch (header.type) {
         case CommandType::Dispatch: return play(as<DispatchCommand>(header));
         case CommandType::DispatchIndirect: return play(as<DispatchIndirectCommand>(header));
+        case CommandType::SideDispatches: return play(as<SideDispatchesCommand>(header));
         case CommandType::BeginTarget: return play(as<BeginTargetCommand>(header));
         case CommandType::EndTarget: return play(as<EndTargetCommand>(header));
         case CommandType::Draw:
@@ -185,6 +186,16 @@ void Player::play(const DispatchIndirectCommand& command) {
     bindPipeline(compute_, kernel.handle());
     if (!bind(compute_, kernel.layout(), command.bindings)) return;
     vk_.CmdDispatchIndirect(commands_, native<VulkanBuffer>(command.buffer).handle(), command.offset);
+}
+
+void Player::play(const SideDispatchesCommand& command) {
+    for (uint32_t i = 0; i < command.count; i++) {
+        const SideDispatch& dispatch = list_->at<SideDispatch>(command.dispatches)[i];
+        const auto& kernel = native<VulkanKernel>(dispatch.kernel);
+        bindPipeline(compute_, kernel.handle());
+        if (!bind(compute_, kernel.layout(), dispatch.bindings)) return;
+        vk_.CmdDispatch(commands_, dispatch.groups, 1, 1);
+    }
 }
 
 Player::StageScope Player::scope(StageMask mask) const {

@@ -100,6 +100,7 @@ private:
     // vk_player.cpp
     void play(const detail::DispatchCommand& command);
     void play(const detail::DispatchIndirectCommand& command);
+    void play(const detail::SideDispatchesCommand& command);
 
     VulkanBuffer& buffer(uint32_t resource) const;
     VulkanTexture& texture(uint32_t resource) const;

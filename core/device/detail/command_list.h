@@ -75,6 +75,7 @@ struct Access {
 enum class CommandType : uint8_t {
     Dispatch,
     DispatchIndirect,
+    SideDispatches,
     BeginTarget,
     EndTarget,
     Draw,
@@ -154,6 +155,23 @@ struct DispatchIndirectCommand {
     Bindings bindings;
     uint32_t buffer = 0;
     uint64_t offset = 0;
+};
+
+struct SideDispatch {
+    uint32_t kernel = 0;
+    Bindings bindings;
+    uint32_t groups = 1;
+    uint32_t first_access = 0;  ///< range of CommandList::accesses, within the command's shared ones
+    uint32_t access_count = 0;
+};
+
+/// Dispatches that may run side by side: none writes what another one accesses, as their own accesses say. The
+/// command's first range is what they use in parts that no words of theirs tell apart: structures in the software
+/// engine's heap.
+struct SideDispatchesCommand {
+    CommandHeader header;
+    uint32_t dispatches = 0;  ///< byte offset in CommandList::bytes of an array of SideDispatch
+    uint32_t count = 0;
 };
 
 enum class LoadOperation : uint8_t { Load, Clear, Discard };

@@ -14,9 +14,6 @@ namespace glint::detail {
 
 namespace {
 
-/// Scratch memory above this is not kept between builds.
-constexpr uint64_t scratch_limit = 64ull << 20;
-
 /// What a program asks for, else what the environment does.
 Expected<TracingEngine> askedEngine(TracingEngine engine) {
     const char* name = std::getenv("GLINT_TRACING");
@@ -419,10 +416,15 @@ Expected<Ref<BufferObject>> DeviceObject::acquireScratch(uint64_t size, Where wh
     std::lock_guard lock(scratch_mutex_);
     if (scratch_ && scratch_->size >= size) return scratch_;
     NativeBufferDesc desc;
-    desc.size = std::max<uint64_t>(size, 1);
     desc.flags = Buffer::FlagScratch;
     desc.name = "scratch";
+    // Twice as much at least, so that builds side by side do not make it anew one by one.
+    desc.size = std::max({size, uint64_t(1), scratch_ ? std::min(2 * scratch_->size, scratch_limit) : 0});
     Expected<Ref<BufferObject>> scratch = createInternal(desc, where);
+    if (!scratch && desc.size > size) {
+        desc.size = size;
+        scratch = createInternal(desc, where);
+    }
     if (scratch && size <= scratch_limit) scratch_ = *scratch;
     return scratch;
 }

@@ -93,8 +93,9 @@ public:
     Expected<Ref<BufferObject>> createInternal(const NativeBufferDesc& desc, Where where);
     Expected<Ref<BufferObject>> createStaging(uint64_t size, bool readback, Where where);
 
-    /// Scratch memory shared by the builds that bring none: one buffer, which grows. Builds with it run one after
-    /// another.
+    /// Scratch memory above this is not kept between builds.
+    static constexpr uint64_t scratch_limit = 64ull << 20;
+    /// Scratch memory shared by the builds that bring none: one buffer, which grows.
     Expected<Ref<BufferObject>> acquireScratch(uint64_t size, Where where);
 
     /// Plays what `core` holds, then puts compacted copies in the place of the structures. `core` is a fresh one

@@ -56,6 +56,8 @@ void RecorderCore::clear() {
     uses_.clear();
     placements_.clear();
     moves_.clear();
+    pending_.clear();
+    shared_scratch_ = 0;
     heap_block_ = none;
     open_queries_.clear();
     target_ = {};
@@ -92,6 +94,7 @@ Status RecorderCore::end(Where where) {
     if (!open_queries_.empty())
         fail(where, ErrorCode::InvalidArgument, "query.open", "{} was begun and not ended",
              open_queries_.back().object()->label());
+    if (!pending_.isEmpty()) playPending();
     if (graphics_ && !list_.error) {
         beginAccesses();
         push<EndTargetCommand>(CommandType::EndTarget);

@@ -7,6 +7,7 @@
 #include <glint/device/compute.h>
 #include <glint/device/detail/command_list.h>
 #include <glint/device/detail/device_object.h>
+#include <glint/device/detail/pending_builds.h>
 #include <glint/device/detail/target_object.h>
 
 #include <array>
@@ -34,7 +35,7 @@ public:
     Queue queue() const { return queue_; }
     const CommandList& list() const { return list_; }
     const Error& error() const { return list_.error; }
-    bool isEmpty() const { return list_.command_count == 0; }
+    bool isEmpty() const { return list_.command_count == 0 && pending_.isEmpty(); }
     Status end(Where where);
 
     bool submitted = false;
@@ -193,8 +194,11 @@ private:
         list_.command_count++;
         return *command;
     }
-    /// The accesses added from here on belong to the next push().
-    void beginAccesses() { first_access_ = static_cast<uint32_t>(list_.accesses.size()); }
+    /// The accesses added from here on belong to the next push(), which comes after the builds that are pending.
+    void beginAccesses() {
+        if (!pending_.isEmpty()) playPending();
+        first_access_ = static_cast<uint32_t>(list_.accesses.size());
+    }
     void access(uint32_t resource, Stage stage, uint8_t flags) {
         list_.accesses.push_back({resource, stage, flags, Layout::None, {}});
     }
@@ -208,10 +212,11 @@ private:
     bool buildInstancesOnHost(TracingObject& tracing, Where where);
     bool buildOnDevice(TracingObject& tracing, BufferObject& scratch, uint64_t scratch_offset, bool update,
                        Where where);
-    bool writeDeviceInstances(TracingObject& tracing, Where where);
-    bool playPass(const BuildPass& pass, uint64_t scratch_size, TracingObject& tracing, BufferObject& scratch,
-                  uint64_t scratch_offset, Where where);
-    void copyInline(BufferObject& buffer, uint64_t offset, uint32_t place, uint64_t size);
+    bool writeDeviceInstances(TracingObject& tracing, PendingBuilds::Copy& copy, Where where);
+    bool preparePass(const BuildPass& pass, TracingObject& tracing, const PendingBuilds::Scratch& scratch, Where where);
+    void playPending();
+    /// Of the accesses that were begun.
+    void copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size);
     bool checkReferences(const TracingObject& tracing, Where where);
     void confirmBuild(TracingObject& tracing);
     uint64_t bindReferences(const ShaderResource& resource, Bound& bound);
@@ -272,14 +277,19 @@ private:
 
     std::vector<Placement> placements_;
     std::vector<TracingHeap::Range> moves_;
-    std::vector<BoundResource> pass_elements_;
-    uint32_t heap_block_ = none;  ///< inline data: the heap's address
+    PendingBuilds pending_;
+    uint64_t shared_scratch_ = 0;  ///< bytes of the device's scratch memory that pending builds use
+    uint32_t heap_block_ = none;   ///< inline data: the heap's address
 
     // Scratch of one call, kept for its capacity.
     std::vector<const NativeTracing*> natives_;
     std::vector<TracingObject*> references_;
     std::vector<TracingObject*> bottoms_;
     std::vector<TracingBuild> builds_;
+    std::vector<BoundResource> pass_elements_;
+    std::vector<PendingBuilds::Pass> passes_;
+    std::vector<Access> build_accesses_;
+    std::vector<SideDispatch> round_;
 };
 
 }  // namespace glint::detail

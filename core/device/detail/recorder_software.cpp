@@ -74,16 +74,30 @@ bool RecorderCore::buildOnDevice(TracingObject& tracing, BufferObject& scratch, 
                        plan.error().message()));
         return false;
     }
-    if (is_top && !writeDeviceInstances(tracing, where)) return false;
+    PendingBuilds::Copy instances;
+    if (is_top && !writeDeviceInstances(tracing, instances, where)) return false;
+
+    const PendingBuilds::Scratch memory = {use(scratch), scratch_offset, scratch_offset + plan->scratch};
+    passes_.clear();
+    build_accesses_.clear();
+    const auto read = [&](Object& object) {
+        build_accesses_.push_back({use(object), Stage::Compute, AccessRead, Layout::None, {}});
+    };
+    build_accesses_.push_back({resource, Stage::Compute, AccessRead | AccessWrite, Layout::None, {}});
+    for (const Ref<TracingObject>& reference : tracing.references) read(*reference);
     for (const BuildPass& pass : plan->passes)
-        if (!playPass(pass, plan->scratch, tracing, scratch, scratch_offset, where)) return false;
+        if (!preparePass(pass, tracing, memory, where)) return false;
+    if (!pending_.takes(build_accesses_, memory)) playPending();
+    pending_.add(build_accesses_, memory, passes_);
+    if (instances.size) pending_.add(instances);
+
     if (is_top) placements_.push_back({Placement::Kind::Built, 0, resource});
     native.bounds.reset();
     if (!update) native.nodes = native.device_nodes;
     return true;
 }
 
-bool RecorderCore::writeDeviceInstances(TracingObject& tracing, Where where) {
+bool RecorderCore::writeDeviceInstances(TracingObject& tracing, PendingBuilds::Copy& copy, Where where) {
     if (tracing.instance_data.empty()) return true;
     const uint64_t size = tracing.instance_data.size() * sizeof(DeviceInstance);
     if (!tracing.instance_buffer || tracing.instance_buffer->size < size) {
@@ -112,22 +126,20 @@ bool RecorderCore::writeDeviceInstances(TracingObject& tracing, Where where) {
             placements_.push_back(
                 {Placement::Kind::Instance, at + static_cast<uint32_t>(offsetof(DeviceInstance, texel)), use(*bottom)});
     }
-    copyInline(*tracing.instance_buffer, 0, place, size);
+    copy = {use(*tracing.instance_buffer), place, size};
     return true;
 }
 
-bool RecorderCore::playPass(const BuildPass& pass, uint64_t scratch_size, TracingObject& tracing, BufferObject& scratch,
-                            uint64_t scratch_offset, Where where) {
+bool RecorderCore::preparePass(const BuildPass& pass, TracingObject& tracing, const PendingBuilds::Scratch& scratch,
+                               Where where) {
     TracingHeap& heap = *device_->heap();
     const Expected<KernelObject*> kernel = heap.kernel(pass.kernel);
     if (!kernel) {
         fail(kernel.error().at(where));
         return false;
     }
-    const uint32_t program = use(**kernel);
     const bool uses_heap = usesHeap(pass.kernel);
     const uint32_t heap_resource = use(heap.texels());
-    const uint32_t structure = use(tracing);
 
     std::vector<BoundResource>& elements = pass_elements_;
     elements.clear();
@@ -140,17 +152,22 @@ bool RecorderCore::playPass(const BuildPass& pass, uint64_t scratch_size, Tracin
     };
     if (uses_heap && heap.form() != HeapForm::Address)
         for (uint32_t i = 0; i < heap.buffers(); i++) bind(heap_resource, i * heap_buffer_size, whole_buffer);
-    const uint32_t scratch_resource = use(scratch);
-    bind(scratch_resource, scratch_offset, scratch_size);
+    bind(scratch.buffer, scratch.begin, scratch.end - scratch.begin);
     for (uint32_t i = 0; i < pass.input_count; i++) {
         const BuildBinding& input = pass.inputs[i];
-        BufferObject* buffer = &scratch;
-        if (input.buffer == BuildBinding::Buffer::Indices)
-            buffer = static_cast<BufferObject*>(tracing.geometries[input.geometry].index_buffer);
-        if (input.buffer == BuildBinding::Buffer::Data) buffer = dataOf(tracing, input.geometry);
-        const uint64_t offset = input.offset + (buffer == &scratch ? scratch_offset : 0);
+        if (input.buffer == BuildBinding::Buffer::Scratch) {
+            bind(scratch.buffer, scratch.begin + input.offset, input.size);
+            continue;
+        }
+        BufferObject& buffer = input.buffer == BuildBinding::Buffer::Data
+                                   ? *dataOf(tracing, input.geometry)
+                                   : *static_cast<BufferObject*>(tracing.geometries[input.geometry].index_buffer);
+        const uint32_t resource = use(buffer);
         // Back ends make buffers of whole words.
-        bind(use(*buffer), offset, std::min(input.size, (buffer->size + 3) / 4 * 4 - offset));
+        bind(resource, input.offset, std::min(input.size, (buffer.size + 3) / 4 * 4 - input.offset));
+        const bool is_known =
+            std::ranges::any_of(build_accesses_, [&](const Access& access) { return access.resource == resource; });
+        if (!is_known) build_accesses_.push_back({resource, Stage::Compute, AccessRead, Layout::None, {}});
     }
     for (const BoundResource& element : elements)
         if (element.size != whole_buffer && element.size > device_->features().maxStorageSize) {
@@ -160,38 +177,64 @@ bool RecorderCore::playPass(const BuildPass& pass, uint64_t scratch_size, Tracin
             return false;
         }
 
-    beginAccesses();
-    access(structure, Stage::Compute, AccessRead | AccessWrite);
-    if (uses_heap) access(heap_resource, Stage::Compute, AccessRead | AccessWrite);
-    access(scratch_resource, Stage::Compute, AccessRead | AccessWrite);
-    for (const BoundResource& element : elements)
-        if (element.resource != heap_resource && element.resource != scratch_resource)
-            access(element.resource, Stage::Compute, AccessRead);
-    for (const Ref<TracingObject>& reference : tracing.references) access(use(*reference), Stage::Compute, AccessRead);
-
-    Bindings bindings;
+    PendingBuilds::Pass& made = passes_.emplace_back();
+    made.uses_heap = uses_heap;
+    made.dispatch.kernel = use(**kernel);
+    made.dispatch.groups = (pass.threads + (*kernel)->group_size[0] - 1) / (*kernel)->group_size[0];
+    Bindings& bindings = made.dispatch.bindings;
     bindings.bound = append(elements.data(), elements.size() * sizeof(BoundResource), alignof(BoundResource));
     bindings.bound_count = static_cast<uint32_t>(elements.size());
     bindings.push = append(&pass.constants, sizeof(pass.constants), 4);
     bindings.push_size = sizeof(pass.constants);
     const auto constant = [&](size_t offset) { return bindings.push + static_cast<uint32_t>(offset); };
-    placements_.push_back({Placement::Kind::Hierarchy, constant(offsetof(BuildConstants, hierarchy)), structure});
+    placements_.push_back({Placement::Kind::Hierarchy, constant(offsetof(BuildConstants, hierarchy)), use(tracing)});
     if (heap.form() == HeapForm::Address)
         placements_.push_back(
             {Placement::Kind::Address, constant(offsetof(BuildConstants, heap_address)), heap_resource});
-
-    auto& command = push<DispatchCommand>(CommandType::Dispatch);
-    command.header.untracked = false;  // see buildTracings
-    command.kernel = program;
-    command.bindings = bindings;
-    command.groups[0] = (pass.threads + (*kernel)->group_size[0] - 1) / (*kernel)->group_size[0];
     return true;
 }
 
-void RecorderCore::copyInline(BufferObject& buffer, uint64_t offset, uint32_t place, uint64_t size) {
-    const uint32_t resource = use(buffer);
-    beginAccesses();
-    access(resource, Stage::Copy, AccessWrite);
+void RecorderCore::playPending() {
+    const auto count = [&] { return static_cast<uint32_t>(list_.accesses.size()); };
+    for (const PendingBuilds::Copy& copy : pending_.copies()) {
+        first_access_ = count();
+        access(copy.buffer, Stage::Copy, AccessWrite);
+        copyInline(copy.buffer, 0, copy.data, copy.size);
+    }
+    const uint32_t first = count();
+    list_.accesses.insert(list_.accesses.end(), pending_.accesses().begin(), pending_.accesses().end());
+    const uint32_t heap = use(device_->heap()->texels());
+    const auto play = [&](std::span<const SideDispatch> dispatches, bool uses_heap, uint32_t shared, uint32_t size) {
+        first_access_ = count();
+        if (uses_heap) access(heap, Stage::Compute, AccessRead | AccessWrite);
+        const uint32_t place = append(dispatches.data(), dispatches.size_bytes(), alignof(SideDispatch));
+        auto& command = push<SideDispatchesCommand>(CommandType::SideDispatches);
+        command.header.untracked = false;  // see buildTracings
+        command.header.first_shared = shared;
+        command.header.shared_count = size;
+        command.dispatches = place;
+        command.count = static_cast<uint32_t>(dispatches.size());
+    };
+    // Where the heap is bound, it is bound whole: the validation layers would see two dispatches write all of it.
+    const bool is_bound = device_->heap()->form() != HeapForm::Address;
+    for (uint32_t round = 0; round < pending_.rounds(); round++) {
+        round_.clear();
+        bool uses_heap = false;
+        pending_.forEachPass(round, [&](const PendingBuilds::Pass& pass) {
+            SideDispatch dispatch = pass.dispatch;
+            dispatch.first_access += first;
+            if (pass.uses_heap && is_bound)
+                return play({&dispatch, 1}, true, dispatch.first_access, dispatch.access_count);
+            round_.push_back(dispatch);
+            uses_heap = uses_heap || pass.uses_heap;
+        });
+        if (!round_.empty()) play(round_, uses_heap, first, static_cast<uint32_t>(pending_.accesses().size()));
+    }
+    pending_.clear();
+    shared_scratch_ = 0;
+}
+
+void RecorderCore::copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size) {
     auto& command = push<CopyInlineCommand>(CommandType::CopyInline);
     command.header.untracked = false;  // see buildTracings
     command.buffer = resource;
@@ -222,12 +265,7 @@ bool RecorderCore::buildInstancesOnHost(TracingObject& tracing, Where where) {
     beginAccesses();
     access(heap, Stage::Copy, AccessWrite);
     access(resource, Stage::Copy, AccessWrite);
-    auto& command = push<CopyInlineCommand>(CommandType::CopyInline);
-    command.header.untracked = false;  // see buildTracings
-    command.buffer = heap;
-    command.offset = uint64_t(native.range.first) * sizeof(Texel);
-    command.data = place;
-    command.size = hierarchy->bytes();
+    copyInline(heap, uint64_t(native.range.first) * sizeof(Texel), place, hierarchy->bytes());
     native.bounds = boundsOf(*hierarchy);
     return true;
 }

@@ -103,7 +103,13 @@ void RecorderCore::buildTracing(const Tracing& tracing, const Buffer& scratch, u
     BufferObject* memory = nullptr;
     Ref<BufferObject> own;
     if (scratch.state() == ObjectState::Null) {
-        Expected<Ref<BufferObject>> shared = device_->acquireScratch(size, where);
+        // Behind what pending builds use, so that they run side by side; or in its place, one after the other.
+        if (shared_scratch_ + size <= DeviceObject::scratch_limit) offset = shared_scratch_;
+        Expected<Ref<BufferObject>> shared = device_->acquireScratch(offset + size, where);
+        if (!shared && offset > 0) {
+            offset = 0;
+            shared = device_->acquireScratch(size, where);
+        }
         if (!shared) return fail(shared.error());
         own = *shared;
         memory = own.get();
@@ -120,6 +126,8 @@ void RecorderCore::buildTracing(const Tracing& tracing, const Buffer& scratch, u
                         size, memory->label(), memory->size, offset);
     }
     buildTracings({&object, 1}, {&offset, 1}, *memory, update, where);
+    const uint64_t alignment = device_->features().scratchAlignment;
+    if (own && !pending_.isEmpty()) shared_scratch_ = (offset + size + alignment - 1) / alignment * alignment;
 }
 
 void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,

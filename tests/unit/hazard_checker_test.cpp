@@ -671,5 +671,48 @@ TEST_F(HazardChecker, UntrackedCommandsAreTheCallersAffair) {
     EXPECT_EQ(findings[0].code(), ErrorCode::InvalidArgument);
 }
 
+// Dispatches of one command.
+
+TEST_F(HazardChecker, DispatchesSideBySideMustNotMeet) {
+    const Side change = {{changes(a, Stage::Compute), reads(c, Stage::Compute)}};
+    const Side change_other = {{changes(b, Stage::Compute), reads(c, Stage::Compute)}};
+    EXPECT_THAT(judged(List().dispatches({change, change_other})), IsEmpty());
+    EXPECT_THAT(judged(List().barrier(compute, compute).dispatches({change, change_other, change})),
+                ElementsAre("hazard.side_by_side"));
+    EXPECT_EQ(findings[0].object(), "'a'");
+    EXPECT_THAT(findings[0].message(), HasSubstr("number 2 writes what number 0 writes"));
+    EXPECT_THAT(judged(List().barrier(compute, compute).dispatches({change, {{reads(a, Stage::Compute)}}})),
+                ElementsAre("hazard.side_by_side"));
+    EXPECT_THAT(judged(List().barrier(compute, compute).dispatches({{{reads(a, Stage::Compute)}}, change})),
+                ElementsAre("hazard.side_by_side"));
+}
+
+TEST_F(HazardChecker, DispatchesSideBySideMayShareABufferInParts) {
+    const auto part = [&](uint64_t offset, uint64_t size) {
+        return Side{{changes(a, Stage::Compute)}, {{&a, offset, size}}};
+    };
+    EXPECT_THAT(judged(List().dispatches({part(0, 64), part(64, 64), part(192, 64), part(128, 64)})), IsEmpty());
+    EXPECT_THAT(judged(List().barrier(compute, compute).dispatches({part(0, 64), part(128, 64), part(60, 8)})),
+                ElementsAre("hazard.side_by_side"));
+    // What is bound twice is used from the first to the last of it.
+    const Side both = {{changes(a, Stage::Compute)}, {{&a, 0, 16}, {&a, 112, 16}}};
+    EXPECT_THAT(judged(List().barrier(compute, compute).dispatches({both, part(64, 16)})),
+                ElementsAre("hazard.side_by_side"));
+    EXPECT_THAT(judged(List().barrier(compute, compute).dispatches({both, part(128, 16)})), IsEmpty());
+}
+
+TEST_F(HazardChecker, DispatchesSideBySideAreOrderedWithTheRest) {
+    const Side change = {{changes(a, Stage::Compute)}};
+    const Side change_other = {{changes(b, Stage::Compute)}};
+    EXPECT_THAT(judged(List().dispatches({change, change_other}).dispatches({change, change_other})),
+                ElementsAre(read_after_write, read_after_write));
+    EXPECT_THAT(judged(List()
+                           .barrier(compute, compute)
+                           .dispatches({change, change_other})
+                           .barrier(compute, compute)
+                           .dispatch({reads(b, Stage::Compute)})),
+                IsEmpty());
+}
+
 }  // namespace
 }  // namespace glint::test

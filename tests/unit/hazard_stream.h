@@ -52,6 +52,17 @@ inline Touch reads(Thing& thing, Stage stage) { return {&thing, stage, AccessRea
 inline Touch writes(Thing& thing, Stage stage) { return {&thing, stage, AccessWrite}; }
 inline Touch changes(Thing& thing, Stage stage) { return {&thing, stage, AccessRead | AccessWrite}; }
 
+/// One of several dispatches that run side by side, and the parts of buffers that are bound to it.
+struct Side {
+    struct Part {
+        Thing* thing;
+        uint64_t offset;
+        uint64_t size;
+    };
+    std::vector<Touch> touches;
+    std::vector<Part> parts = {};
+};
+
 /// A transition.
 struct Turn {
     Thing* thing;
@@ -77,6 +88,29 @@ public:
         return append(command, type, touches, untracked);
     }
     List& dispatch(const std::vector<Touch>& touches) { return command(CommandType::Dispatch, touches); }
+    List& dispatches(const std::vector<Side>& sides) {
+        std::vector<Touch> touches;
+        std::vector<detail::SideDispatch> all;
+        for (const Side& side : sides) {
+            std::vector<detail::BoundResource> bound;
+            for (const Side::Part& part : side.parts) {
+                detail::BoundResource& one = bound.emplace_back();
+                one.resource = index(part.thing);
+                one.offset = part.offset;
+                one.size = part.size;
+            }
+            detail::SideDispatch& dispatch = all.emplace_back();
+            dispatch.bindings.bound = store(std::span<const detail::BoundResource>(bound));
+            dispatch.bindings.bound_count = static_cast<uint32_t>(bound.size());
+            dispatch.first_access = static_cast<uint32_t>(list_->accesses.size() + touches.size());
+            dispatch.access_count = static_cast<uint32_t>(side.touches.size());
+            touches.insert(touches.end(), side.touches.begin(), side.touches.end());
+        }
+        detail::SideDispatchesCommand command;
+        command.dispatches = store(std::span<const detail::SideDispatch>(all));
+        command.count = static_cast<uint32_t>(all.size());
+        return append(command, CommandType::SideDispatches, touches);
+    }
     List& draw(const std::vector<Touch>& touches) { return command(CommandType::Draw, touches); }
 
     List& begin(const std::vector<Touch>& touches, detail::StoreOperation store = detail::StoreOperation::Store) {
@@ -139,6 +173,13 @@ private:
         std::memcpy(list_->commands.data() + list_->commands.size() - size, &command, sizeof(Command));
         list_->command_count++;
         return *this;
+    }
+    template <class T>
+    uint32_t store(std::span<const T> values) {
+        const size_t place = (list_->bytes.size() + alignof(T) - 1) / alignof(T) * alignof(T);
+        list_->bytes.resize(place + values.size_bytes());
+        std::memcpy(list_->bytes.data() + place, values.data(), values.size_bytes());
+        return static_cast<uint32_t>(place);
     }
     uint32_t index(Thing* thing) {
         for (size_t i = 0; i < list_->resources.size(); i++)

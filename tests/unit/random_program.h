@@ -204,6 +204,10 @@ public:
             bottoms_[i].addVertexBuffer(12, FormatRGBf32, 12, vertices_);
             EXPECT_THAT(bottoms_[i].create(Tracing::TypeTriangle, Tracing::FlagUpdate), IsOk());
         }
+        const uint64_t alignment = device.getFeatures().scratchAlignment;
+        scratch_part_ = (bottoms_[0].getBuildSize() + alignment - 1) / alignment * alignment;
+        scratch_ = device.createBuffer(Buffer::FlagScratch | Buffer::FlagStorage, scratch_parts * scratch_part_,
+                                       "scratch of the program");
         top_ = device.createTracing("top");
         top_.setInstances(4);
         EXPECT_THAT(top_.create(Tracing::TypeInstance), IsOk());
@@ -228,6 +232,7 @@ public:
 
 private:
     static constexpr uint64_t buffer_size = 1024;
+    static constexpr uint64_t scratch_parts = 3;
 
     void accept(const Status& status) {
         // What a failed submission would have built is unbuilt.
@@ -237,6 +242,7 @@ private:
 
     uint64_t below(uint64_t count) { return random_.below(count); }
     const Buffer& buffer() { return buffers_[below(buffers_.size())]; }
+    const Tracing& bottom() { return bottoms_[below(bottoms_.size())]; }
     const Texture& texture() { return textures_[below(textures_.size())]; }
     Slice level(const Texture& texture) {
         return {static_cast<uint16_t>(below(texture.getMipmaps())), 1,
@@ -250,12 +256,12 @@ private:
     }
 
     void buildAll() {
-        accept(device_.buildTracings({bottoms_[0], bottoms_[1]}));
+        accept(device_.buildTracings(bottoms_, Buffer()));
         buildTop();
     }
 
     void buildTop() {
-        const Tracing::Instance all[] = {{.tracing = &bottoms_[below(2)]}, {.tracing = &bottoms_[below(2)]}, {}};
+        const Tracing::Instance all[] = {{.tracing = &bottom()}, {.tracing = &bottom()}, {}};
         device_.setTracing(top_, std::span(all).first(1 + below(3)));
         device_.buildTracing(top_);
         accept(device_.flush());
@@ -435,11 +441,21 @@ private:
             list.setStorageBuffer(0, vertices_);
             list.dispatch(8);
         }
-        const Tracing& bottom = bottoms_[below(2)];
-        if (below(2))
-            list.updateTracing(bottom);
-        else
-            list.buildTracing(bottom);
+        for (size_t i = 1 + below(4); i > 0; i--) {
+            const uint64_t offset = below(scratch_parts) * scratch_part_;
+            switch (below(5)) {
+                case 0: list.updateTracing(bottom()); break;
+                case 1: list.buildTracing(bottom()); break;
+                case 2: list.updateTracing(bottom(), scratch_, offset); break;
+                case 3: list.buildTracing(bottom(), scratch_, offset); break;
+                default: list.buildTracing(top_); break;
+            }
+            if (below(6)) continue;
+            list.barrier();
+            list.setKernel(programs_.change);
+            list.setStorageBuffer(0, scratch_);
+            list.dispatch(8);
+        }
         list.buildTracing(top_);
     }
 
@@ -497,7 +513,9 @@ private:
     Texture depth_, fine_;
     Query time_;
     Buffer vertices_;
-    std::array<Tracing, 2> bottoms_;
+    std::array<Tracing, 4> bottoms_;
+    Buffer scratch_;
+    uint64_t scratch_part_ = 0;
     Tracing top_;
 };
 

@@ -49,7 +49,8 @@ public:
     /// Replaces the instances of a top-level structure; at most as many as it has room for.
     void setInstances(const Tracing& tracing, std::span<const Tracing::Instance> instances,
                       Where where = Where::current());
-    /// Builds a structure; without a scratch buffer the SDK brings one.
+    /// Builds a structure; without a scratch buffer the SDK brings one. Builds and updates that are recorded one after
+    /// the other run side by side where none needs what another one builds, or its scratch memory.
     void buildTracing(const Tracing& tracing, Where where = Where::current());
     void buildTracing(const Tracing& tracing, const Buffer& scratch, uint64_t offset = 0,
                       Where where = Where::current());

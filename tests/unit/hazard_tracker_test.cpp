@@ -210,6 +210,7 @@ class HazardTrackerSoftware : public HazardTracker {
 protected:
     void SetUp() override { open(TracingEngine::Software); }
 };
+using HazardTrackerSoftwareLong = HazardTrackerSoftware;
 
 TEST_F(HazardTracker, RandomProgramsAreClean) { runPrograms(3000); }
 
@@ -238,6 +239,8 @@ TEST_F(HazardTrackerSoftware, RandomProgramsAreClean) {
 }
 
 TEST_F(HazardTrackerSoftware, WhatIsLeftOutIsMissed) { runMutants(30); }
+
+TEST_F(HazardTrackerSoftwareLong, RandomProgramsAreClean) { runPrograms(20000); }
 
 TEST_F(HazardTrackerLong, WhatIsLeftOutIsMissed) { runMutants(500); }
 

@@ -33,8 +33,8 @@ protected:
         addMesh(createTorus(1.0f, 0.3f, 24, 12));
         addMesh(createTorus(1.0f, 0.2f, 5, 3), true);
         addBoxes(100);
-        std::vector<Tracing::Instance> instances;
-        for (const Tracing& bottom : bottoms) instances.push_back({.tracing = &bottom});
+        std::vector<Tracing::Instance> instances(bottoms.size());
+        for (size_t i = 0; i < bottoms.size(); i++) instances[i].tracing = &bottoms[i];
         for (uint32_t count : {3u, static_cast<uint32_t>(bottoms.size())})
             tops.push_back(device.createTracing(std::span(instances).first(count), Tracing::FlagFastBuild, "top"));
         scratch_part = 1;

@@ -10,6 +10,10 @@ void Compute::setKernel(const Kernel& kernel, Where where) {
     if (core_) core_->setKernel(kernel, where);
 }
 
+void Compute::setTraversal(const Traversal& traversal, uint32_t generation, Where where) {
+    if (core_) core_->setTraversal(traversal, generation, where);
+}
+
 void Compute::dispatch(uint64_t width, uint64_t height, uint64_t depth, Where where) {
     if (core_) core_->dispatch(width, height, depth, where);
 }

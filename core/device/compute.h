@@ -2,6 +2,7 @@
 
 #include <glint/device/kernel.h>
 #include <glint/device/recorder.h>
+#include <glint/device/traversal.h>
 
 namespace glint {
 
@@ -11,13 +12,18 @@ public:
     explicit Compute(detail::RecorderPtr core) : Recorder(std::move(core)) {}
 
     void setKernel(const Kernel& kernel, Where where = Where::current());
+    /// In the place of a kernel: dispatches start rays with this ray-generation shader of the traversal's, counted in
+    /// load order. Errors: "traversal.generation".
+    void setTraversal(const Traversal& traversal, uint32_t generation = 0, Where where = Where::current());
 
-    /// Runs at least width x height x depth threads: whole groups are started, so that the shader has to check.
-    /// Nothing is recorded if one is 0. Errors: "dispatch.*", "bind.*".
+    /// With a kernel, runs at least width x height x depth threads: whole groups are started, so that the shader has to
+    /// check. With a traversal, starts as many rays and no more. Nothing is recorded if one is 0. Errors: "dispatch.*",
+    /// "bind.*".
     void dispatch(uint64_t width, uint64_t height = 1, uint64_t depth = 1, Where where = Where::current());
-    /// One thread for each texel of the texture's first mip level.
+    /// One thread or ray for each texel of the texture's first mip level.
     void dispatch(const Texture& texture, Where where = Where::current());
-    /// Group counts (three uint32_t) from a buffer with FlagIndirect, at a multiple of 4.
+    /// Group counts, with a traversal counts of rays (three uint32_t) from a buffer with FlagIndirect, at a multiple of
+    /// 4. Rays: Features::indirectRays; too many of them are undefined.
     void dispatchIndirect(const Buffer& buffer, uint64_t offset = 0, Where where = Where::current());
 
     /// Copies. Offsets and sizes in bytes; buffers must not overlap. Errors: "copy.range", "copy.overlap".

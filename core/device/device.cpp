@@ -131,6 +131,20 @@ Tracing Device::createTracing(std::span<const Tracing::Instance> instances, Trac
     return tracing;
 }
 
+Traversal Device::createTraversal(std::string_view name, Where where) {
+    Traversal traversal = make<Traversal, detail::TraversalObject>(*this, name, where);
+    if (traversal.state() != ObjectState::Building) return traversal;
+    DeviceObject& object = *opened(*this);
+    if (object.features().rayTracing)
+        object.buildForTraversals();
+    else
+        traversal.object()->fail(makeError(where, ErrorCode::Unsupported, "device.unsupported",
+                                           "{}: {} {} the feature {}", traversal.object()->label(), getInfo().name,
+                                           getInfo().features & FeatureRayTracing ? "was opened without" : "lacks",
+                                           toString(FeatureRayTracing)));
+    return traversal;
+}
+
 Compute Device::createCompute(Queue queue, std::string_view name, Where) {
     DeviceObject* object = opened(*this);
     if (!object) return Compute(detail::RecorderPtr());

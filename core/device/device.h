@@ -16,6 +16,7 @@
 #include <glint/device/target.h>
 #include <glint/device/texture.h>
 #include <glint/device/tracing.h>
+#include <glint/device/traversal.h>
 #include <glint/device/types.h>
 #include <glint/device/window.h>
 
@@ -139,6 +140,11 @@ public:
     Tracing createTracing(std::initializer_list<Tracing::Instance> instances, Where where = Where::current()) {
         return createTracing(std::span(instances.begin(), instances.size()), Tracing::FlagFastTrace, {}, where);
     }
+
+    /// A ray-tracing pipeline to configure. From the first call on, the structures that are built on this device are
+    /// built by the driver, too, whoever answers ray queries; earlier ones have to be built again before a Traversal
+    /// sees them ("tracing.traversal"). Errors: "device.unsupported" without Features::rayTracing.
+    Traversal createTraversal(std::string_view name = {}, Where where = Where::current());
 
     // Recorders.
 

@@ -1,5 +1,6 @@
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
+#include <glint/device/detail/driver_tracing.h>
 #include <glint/device/detail/recorder_core.h>
 #include <glint/device/detail/texture_layout.h>
 #include <glint/device/device.h>
@@ -119,10 +120,7 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
             return core->error();
         }
     } else {
-        // Enough for builds to run side by side, within reason.
-        constexpr uint64_t reasonable = 32ull << 20;
-        const Expected<Ref<BufferObject>> own =
-            device.acquireScratch(std::max(largest, std::min(total, reasonable)), where);
+        const Expected<Ref<BufferObject>> own = device.acquireScratch(detail::reasonableScratch(largest, total), where);
         if (!own) {
             core->fail(own.error());
             return core->error();
@@ -130,23 +128,11 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
         memory = *own;
     }
 
-    const uint64_t alignment = device.features().scratchAlignment;
     const auto build = [&](std::span<TracingObject* const> objects) {
-        std::vector<uint64_t> offsets;
-        uint64_t offset = 0;
-        size_t first = 0;
-        for (size_t i = 0; i < objects.size(); i++) {
-            const uint64_t size = objects[i]->nativeTracing()->build_size;
-            if (offset + size > memory->size) {
-                core->buildTracings(objects.subspan(first, i - first), offsets, *memory, false, where);
-                offsets.clear();
-                offset = 0;
-                first = i;
-            }
-            offsets.push_back(offset);
-            offset += (size + alignment - 1) / alignment * alignment;
-        }
-        if (first < objects.size()) core->buildTracings(objects.subspan(first), offsets, *memory, false, where);
+        detail::forEachBatch(objects, memory->size, device.features().scratchAlignment,
+                             [&](std::span<TracingObject* const> batch, std::span<const uint64_t> offsets) {
+                                 core->buildTracings(batch, offsets, *memory, false, where);
+                             });
     };
 
     std::vector<TracingObject*> compacted;
@@ -157,6 +143,10 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
         if (Status status = device.buildOnHost(levels[0], where); !status) return status;
         // They have no room to spare.
         for (TracingObject* object : compacted) object->compacted = true;
+        core->buildForTraversals(levels[0], false, where);
+        std::erase_if(compacted, [](TracingObject*& object) { return !(object = object->driver.get()); });
+        if (!device.buildsForTraversals()) compacted.clear();
+        if (Status status = device.compact(core, compacted, where); !status) return status;
     } else {
         build(levels[0]);
         if (Status status = device.compact(core, compacted, where); !status) return status;

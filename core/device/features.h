@@ -75,7 +75,11 @@ struct Features {
     /// Who provides computeTracing and fragmentTracing; never Auto on an open device.
     TracingEngine tracingEngine = TracingEngine::Driver;
 
-    uint32_t recursionDepth = 0;  ///< of ray-tracing pipelines
+    uint32_t recursionDepth = 0;    ///< of ray-tracing pipelines
+    uint64_t maxRays = 0;           ///< of one dispatch of a Traversal
+    uint32_t maxRecordSize = 0;     ///< bytes of data of a record of a Traversal
+    uint32_t maxAttributeSize = 0;  ///< bytes of hit attributes
+    bool indirectRays = false;      ///< ray counts from a buffer
     uint32_t subgroupSize = 0;
     uint32_t minSubgroupSize = 0;
     uint32_t maxSubgroupSize = 0;

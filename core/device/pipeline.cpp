@@ -238,34 +238,6 @@ bool checkFormat(PipelineObject& pipeline, Format format, bool depth, Pipeline::
 
 }  // namespace
 
-void Pipeline::setUniformMask(uint32_t index, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Uniform, index, 1, mask, where);
-}
-void Pipeline::setStorageMask(uint32_t index, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Storage, index, 1, mask, where);
-}
-void Pipeline::setStorageMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Storage, index, count, mask, where);
-}
-void Pipeline::setTextureMask(uint32_t index, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Texture, index, 1, mask, where);
-}
-void Pipeline::setTextureMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Texture, index, count, mask, where);
-}
-void Pipeline::setSurfaceMask(uint32_t index, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Surface, index, 1, mask, where);
-}
-void Pipeline::setSamplerMask(uint32_t index, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Sampler, index, 1, mask, where);
-}
-void Pipeline::setTracingMask(uint32_t index, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Tracing, index, 1, mask, where);
-}
-void Pipeline::setTexelMask(uint32_t index, Shader::Mask mask, Where where) {
-    declareSlots(SlotKind::Texel, index, 1, mask, where);
-}
-
 void Pipeline::addAttribute(Attribute attribute, Format format, uint32_t buffer, uint32_t offset, uint32_t stride,
                             uint32_t rate, Where where) {
     PipelineObject* pipeline = configurable(object_, where);

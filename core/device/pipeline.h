@@ -108,18 +108,6 @@ public:
         return load(Shader::loadSPIRV(type, path, where), where);
     }
 
-    /// Optional declarations: slot `index` of a kind exists and is seen by the stages of `mask`; create() checks them
-    /// against the shaders ("program.slots", "program.mask").
-    void setUniformMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
-    void setStorageMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
-    void setStorageMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where = Where::current());
-    void setTextureMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
-    void setTextureMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where = Where::current());
-    void setSurfaceMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
-    void setSamplerMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
-    void setTracingMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
-    void setTexelMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
-
     /// Adds the next attribute: locations count up from 0 in the order of the calls. `buffer` is the slot of
     /// Command::setVertexBuffer; `rate` 0 steps by vertex, 1 by instance. At most 16 attributes and buffers, strides of
     /// 1 to 2048 bytes; offset and stride are multiples of a component's size. What the shader does not read is not

@@ -153,6 +153,12 @@ bool ProgramObject::configurable(Where where) {
     return false;
 }
 
+void ProgramObject::addShader(Ref<ShaderObject> shader) {
+    const ShaderStage stage = shader->source.stage;
+    std::erase_if(shaders, [&](const auto& old) { return old->source.stage == stage; });
+    shaders.push_back(std::move(shader));
+}
+
 Status ProgramObject::create(Where where) {
     if (!configurable(where)) {
         if (state() == ObjectState::Failed) return error();
@@ -309,7 +315,16 @@ Expected<BindingLayout> ProgramObject::mergeStages(const Stages& stages, Where w
 
 Error ProgramObject::checkFeatures(const Reflection& stage, Where where) const {
     FeatureMask needed = 0;
-    if (asksRays(stage)) needed |= stage.stage == ShaderStage::Compute ? FeatureComputeTracing : FeatureFragmentTracing;
+    if (stage.stage >= ShaderStage::RayGen) {
+        needed |= FeatureRayTracing;
+        // The software engine rewrites no stage of ray-tracing pipelines.
+        if (stage.uses_ray_query && !device()->backend->features().has(FeatureComputeTracing))
+            return problem(where, ErrorCode::Unsupported, "program.feature",
+                           fmt::format("the {} shader has ray queries, which the driver of {} does not offer",
+                                       glint::toString(stage.stage), device()->info().name));
+    } else if (asksRays(stage)) {
+        needed |= stage.stage == ShaderStage::Compute ? FeatureComputeTracing : FeatureFragmentTracing;
+    }
     if (stage.uses_addresses) needed |= FeatureBufferAddress;
     if (stage.uses_float64) needed |= FeatureShaderf64;
     if (stage.uses_int64) needed |= FeatureShaderu64;
@@ -382,6 +397,7 @@ void setConstant(detail::Object* object, ProgramObject::Constant constant, Progr
 
 bool takes(detail::ObjectType program, ShaderStage stage) {
     if (program == detail::ObjectType::Kernel) return stage == ShaderStage::Compute;
+    if (program == detail::ObjectType::Traversal) return stage >= ShaderStage::RayGen;
     return stage <= ShaderStage::Fragment;
 }
 
@@ -402,8 +418,7 @@ void Program::setShader(const Shader& shader, Where where) {
                              fmt::format("a {} takes no {} shader", toString(program->type()), toString(stage))));
         return;
     }
-    std::erase_if(program->shaders, [&](const auto& old) { return old->source.stage == stage; });
-    program->shaders.push_back(std::move(added));
+    program->addShader(std::move(added));
 }
 
 void Program::setConstant(uint32_t id, int32_t value, Where where) {
@@ -464,6 +479,34 @@ Status Program::reload(bool* changed, Where where) {
     }
     if (changed) *changed = replaced;
     return status;
+}
+
+void Program::setUniformMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Uniform, index, 1, mask, where);
+}
+void Program::setStorageMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Storage, index, 1, mask, where);
+}
+void Program::setStorageMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Storage, index, count, mask, where);
+}
+void Program::setTextureMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Texture, index, 1, mask, where);
+}
+void Program::setTextureMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Texture, index, count, mask, where);
+}
+void Program::setSurfaceMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Surface, index, 1, mask, where);
+}
+void Program::setSamplerMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Sampler, index, 1, mask, where);
+}
+void Program::setTracingMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Tracing, index, 1, mask, where);
+}
+void Program::setTexelMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Texel, index, 1, mask, where);
 }
 
 uint32_t Program::getSlots(SlotKind kind) const {

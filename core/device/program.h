@@ -10,8 +10,8 @@
 
 namespace glint {
 
-/// What Kernel and Pipeline have in common: shaders, constants, slots. Setters keep the first error, which create()
-/// returns and the handle carries. Configure from one thread; once ready, use from any.
+/// What Kernel, Pipeline and Traversal have in common: shaders, constants, slots. Setters keep the first error, which
+/// create() returns and the handle carries. Configure from one thread; once ready, use from any.
 class Program : public Handle {
 public:
     using Where = std::source_location;
@@ -19,7 +19,7 @@ public:
     Program() = default;
     explicit Program(detail::Object* object) : Handle(object) {}
 
-    /// Sets a compiled stage, replacing one of the same type.
+    /// Sets a compiled stage, replacing one of the same type; a Traversal adds it to its groups instead.
     void setShader(const Shader& shader, Where where = Where::current());
 
     /// Value of a specialisation constant by its constant_id or its name in the shader. Checked by create():
@@ -33,9 +33,21 @@ public:
     void setConstant(std::string_view name, float value, Where where = Where::current());
     void setConstant(std::string_view name, bool value, Where where = Where::current());
 
+    /// Optional declarations: slot `index` of a kind exists and is seen by the stages of `mask`; create() checks them
+    /// against the shaders ("program.slots", "program.mask").
+    void setUniformMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setStorageMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setStorageMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where = Where::current());
+    void setTextureMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setTextureMasks(uint32_t index, uint32_t count, Shader::Mask mask, Where where = Where::current());
+    void setSurfaceMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setSamplerMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setTracingMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setTexelMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+
     /// Makes the native object from the stages set; what is configured afterwards changes nothing and is told to the
     /// message callback: "program.created", as for a second call. Errors: "program.*", "kernel.*", "pipeline.*",
-    /// "shader.*", see docs/errors.md.
+    /// "traversal.*", "shader.*", see docs/errors.md.
     Status create(Where where = Where::current());
     /// The same on a thread of the process' pool; the handle is Building until done. Recording with it waits. When the
     /// last handle goes before that, so does the work, or its end is waited for if it has begun.

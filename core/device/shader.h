@@ -10,7 +10,7 @@
 
 namespace glint {
 
-/// One compiled stage, independent of any device. A Shader can be set on many kernels and pipelines.
+/// One compiled stage, independent of any device. A Shader can be set on many kernels, pipelines and traversals.
 /// Files are looked up as given, then in the folders of addPath.
 class Shader : public Handle {
 public:
@@ -35,6 +35,14 @@ public:
     static constexpr Mask MaskFragment = stageBit(ShaderStage::Fragment);
     static constexpr Mask MaskCompute = stageBit(ShaderStage::Compute);
     static constexpr Mask MaskVertexFragment = MaskVertex | MaskFragment;
+    static constexpr Mask MaskRayGen = stageBit(ShaderStage::RayGen);
+    static constexpr Mask MaskRayMiss = stageBit(ShaderStage::RayMiss);
+    static constexpr Mask MaskClosest = stageBit(ShaderStage::Closest);
+    static constexpr Mask MaskFirstHit = stageBit(ShaderStage::FirstHit);
+    static constexpr Mask MaskIntersection = stageBit(ShaderStage::Intersection);
+    static constexpr Mask MaskCallable = stageBit(ShaderStage::Callable);
+    static constexpr Mask MaskTracing =
+        MaskRayGen | MaskRayMiss | MaskClosest | MaskFirstHit | MaskIntersection | MaskCallable;
     static constexpr Mask MaskAll = ~0u;
 
     Shader() = default;

@@ -2,6 +2,7 @@
 
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
+#include <glint/device/detail/driver_tracing.h>
 #include <glint/device/detail/software_tracing.h>
 
 #include <algorithm>
@@ -167,25 +168,7 @@ Status Tracing::create(Type type, Flags flags, std::source_location where) {
         object->setReady();
         return {};
     }
-    if (type == TypeInstance) {
-        detail::NativeBufferDesc desc;
-        desc.size = std::max<uint64_t>(object->instances, 1) * device.backend->instanceSize();
-        desc.flags = Buffer::FlagTracing | Buffer::FlagAddress;
-        desc.name = "instances";
-        Expected<detail::Ref<detail::BufferObject>> made = device.createInternal(desc, where);
-        if (!made) return Status(object->fail(made.error()));
-        object->instance_buffer = std::move(*made);
-    }
-    detail::NativeTracingDesc desc;
-    desc.type = type;
-    desc.flags = flags;
-    desc.geometries = object->geometries;
-    desc.instances = object->instances;
-    desc.name = object->name();
-    Expected<std::unique_ptr<detail::NativeTracing>> made = device.backend->createTracing(desc);
-    if (!made) return Status(object->fail(made.error().at(where)));
-    object->native = std::move(*made);
-    object->setReady();
+    if (const Error error = detail::createDriverNative(*object, where)) return Status(object->fail(error));
     return {};
 }
 
@@ -216,7 +199,9 @@ uint64_t Tracing::getUpdateSize() const {
 }
 
 uint64_t Tracing::getMemory() const {
-    return *this ? static_cast<TracingObject*>(object_)->nativeTracing()->memory : 0;
+    if (!*this) return 0;
+    const auto& object = *static_cast<TracingObject*>(object_);
+    return object.nativeTracing()->memory + (object.driver ? object.driver->nativeTracing()->memory : 0);
 }
 
 }  // namespace glint

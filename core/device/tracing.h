@@ -70,7 +70,8 @@ public:
     /// Bytes of scratch memory that a build or an update needs.
     uint64_t getBuildSize() const;
     uint64_t getUpdateSize() const;
-    /// Bytes of the structure; less after compaction. Before the first build in software: the most that it may take.
+    /// Bytes of the structure; less after compaction. Before the first build in software: the most that it may take. On
+    /// devices with a Traversal, with what the driver builds beside it.
     uint64_t getMemory() const;
 };
 

@@ -55,7 +55,8 @@ constexpr std::string_view fragment[] = {"GL_ARB_shader_stencil_export", "GL_EXT
                                          "GL_EXT_mesh_shader", "GL_EXT_multiview"};
 constexpr std::string_view compute[] = {"GL_EXT_shared_memory_block"};
 constexpr std::string_view mesh[] = {"GL_EXT_mesh_shader", "GL_EXT_shared_memory_block"};
-constexpr std::string_view tracing[] = {"GL_EXT_ray_cull_mask", "GL_EXT_ray_tracing"};
+// GL_EXT_ray_cull_mask would ask every device for VK_KHR_ray_tracing_maintenance1.
+constexpr std::string_view tracing[] = {"GL_EXT_ray_tracing"};
 
 std::span<const std::string_view> extensionsOf(ShaderStage stage) {
     switch (stage) {

@@ -94,6 +94,8 @@ const char* toString(CommandType type) {
         case CommandType::Dispatch: return "dispatch";
         case CommandType::DispatchIndirect: return "indirect dispatch";
         case CommandType::SideDispatches: return "dispatches";
+        case CommandType::TraceRays: return "dispatch of rays";
+        case CommandType::TraceRaysIndirect: return "indirect dispatch of rays";
         case CommandType::BeginTarget: return "begin of target";
         case CommandType::EndTarget: return "end of target";
         case CommandType::Draw: return "draw";

@@ -50,6 +50,10 @@ ByteRange touchedRange(const CommandList& list, const CommandHeader& header, uin
             if (const auto* command = as<DispatchCommand>(header))
                 return boundRange(list, header, command->bindings, resource);
             break;
+        case CommandType::TraceRays:
+            if (const auto* command = as<TraceRaysCommand>(header))
+                return boundRange(list, header, command->bindings, resource);
+            break;
         case CommandType::CopyInline:
             if (const auto* command = as<CopyInlineCommand>(header))
                 return {command->offset, command->offset + command->size};

@@ -42,6 +42,17 @@ public:
                 for (uint32_t i = 0; i < command.count; i++) side(list_.at<SideDispatch>(command.dispatches)[i]);
                 break;
             }
+            case CommandType::TraceRays: {
+                const auto& command = as<TraceRaysCommand>();
+                bindings(command.bindings, native<NullTraversal>(command.traversal).layout);
+                break;
+            }
+            case CommandType::TraceRaysIndirect: {
+                const auto& command = as<TraceRaysIndirectCommand>();
+                bindings(command.bindings, native<NullTraversal>(command.traversal).layout);
+                need(command.buffer, Stage::Indirect, AccessRead);
+                break;
+            }
             case CommandType::BeginTarget: {
                 const auto& command = as<BeginTargetCommand>();
                 for (uint32_t i = 0; i < command.color_count; i++) attachment(command.colors[i], Stage::ColorTarget);

@@ -43,7 +43,13 @@ Features describeFeatures(FeatureMask mask, const NullSettings& settings) {
     features.shaderu16 = mask & FeatureShaderu16;
     features.shaderu64 = mask & FeatureShaderu64;
     features.atomicBufferu64 = mask & FeatureAtomicBufferu64;
-    features.recursionDepth = features.rayTracing ? 31 : 0;
+    if (features.rayTracing) {
+        features.recursionDepth = 31;
+        features.maxRays = 1ull << 30;
+        features.maxRecordSize = 4096 - 32;
+        features.maxAttributeSize = 32;
+        features.indirectRays = true;
+    }
     features.subgroupSize = 32;
     features.minSubgroupSize = 4;
     features.maxSubgroupSize = 64;
@@ -147,6 +153,11 @@ public:
     }
     Expected<std::unique_ptr<NativePipeline>> createPipeline(const PipelineDesc& desc) override {
         auto made = create<NullPipeline>(0, control_, 0, desc.name);
+        if (made && desc.layout) (*made)->layout = *desc.layout;
+        return made;
+    }
+    Expected<std::unique_ptr<NativeTraversal>> createTraversal(const TraversalDesc& desc) override {
+        auto made = create<NullTraversal>(0, control_, 0, desc.name);
         if (made && desc.layout) (*made)->layout = *desc.layout;
         return made;
     }

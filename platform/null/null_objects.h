@@ -108,6 +108,11 @@ struct NullPipeline final : detail::NativePipeline, NullObject {
     BindingLayout layout;
 };
 
+struct NullTraversal final : detail::NativeTraversal, NullObject {
+    using NullObject::NullObject;
+    BindingLayout layout;
+};
+
 struct NullTracing final : detail::NativeTracing, NullMemory {
     NullTracing(std::shared_ptr<NullControl> control, const detail::NativeTracingDesc& desc);
 

@@ -96,6 +96,13 @@ void NullPlayer::play(const CommandHeader& header) {
             bytes(command.buffer, command.offset, 12);
             break;
         }
+        case CommandType::TraceRays: counters_.dispatches++; break;
+        case CommandType::TraceRaysIndirect: {
+            const auto& command = as<TraceRaysIndirectCommand>(header);
+            counters_.dispatches++;
+            bytes(command.buffer, command.offset, 12);
+            break;
+        }
         case CommandType::BeginTarget: beginTarget(as<BeginTargetCommand>(header)); break;
         case CommandType::EndTarget: endTarget(); break;
         case CommandType::Draw:

@@ -378,7 +378,13 @@ Features describeFeatures(const Instance& instance, const Adapter& adapter, Feat
     features.shaderu64 = (mask & FeatureShaderu64) != 0;
     features.atomicBufferu64 = (mask & FeatureAtomicBufferu64) != 0;
 
-    features.recursionDepth = features.rayTracing ? pipelines.maxRayRecursionDepth : 0;
+    if (features.rayTracing) {
+        features.recursionDepth = pipelines.maxRayRecursionDepth;
+        features.maxRays = pipelines.maxRayDispatchInvocationCount;
+        features.maxRecordSize = pipelines.maxShaderGroupStride - pipelines.shaderGroupHandleSize;
+        features.maxAttributeSize = pipelines.maxRayHitAttributeSize;
+        features.indirectRays = adapter.offered.ray_pipeline.rayTracingPipelineTraceRaysIndirect;
+    }
     features.subgroupSize = v11.subgroupSize;
     features.minSubgroupSize = v13.minSubgroupSize;
     features.maxSubgroupSize = v13.maxSubgroupSize;

@@ -8,7 +8,9 @@ namespace glint::vulkan {
 
 namespace {
 
-constexpr Buffer::Flags address_flags = Buffer::FlagAddress | Buffer::FlagTracing | Buffer::FlagScratch;
+// Counts of rays are read by address.
+constexpr Buffer::Flags address_flags =
+    Buffer::FlagAddress | Buffer::FlagTracing | Buffer::FlagScratch | Buffer::FlagIndirect;
 
 VkBufferUsageFlags bufferUsage(Buffer::Flags flags, const FeatureChain& features) {
     VkBufferUsageFlags usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;

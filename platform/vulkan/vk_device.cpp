@@ -9,6 +9,7 @@
 #include "platform/vulkan/vk_sampler.h"
 #include "platform/vulkan/vk_texture.h"
 #include "platform/vulkan/vk_tracing.h"
+#include "platform/vulkan/vk_traversal.h"
 #include "platform/vulkan/vk_window.h"
 #include "platform/vulkan/vulkan.h"
 
@@ -160,6 +161,10 @@ Expected<std::unique_ptr<NativeKernel>> VulkanDevice::createKernel(const KernelD
 
 Expected<std::unique_ptr<NativePipeline>> VulkanDevice::createPipeline(const PipelineDesc& desc) {
     return VulkanPipeline::create(*this, desc);
+}
+
+Expected<std::unique_ptr<NativeTraversal>> VulkanDevice::createTraversal(const TraversalDesc& desc) {
+    return VulkanTraversal::create(*this, desc);
 }
 
 Expected<std::unique_ptr<NativeTracing>> VulkanDevice::createTracing(const NativeTracingDesc& desc) {

@@ -58,6 +58,7 @@ public:
     Expected<std::unique_ptr<detail::NativeSampler>> createSampler(const SamplerDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeKernel>> createKernel(const detail::KernelDesc& desc) override;
     Expected<std::unique_ptr<detail::NativePipeline>> createPipeline(const detail::PipelineDesc& desc) override;
+    Expected<std::unique_ptr<detail::NativeTraversal>> createTraversal(const detail::TraversalDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeTracing>> createTracing(const detail::NativeTracingDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeQuery>> createQuery(Query::Type type) override;
     Expected<std::unique_ptr<detail::NativeWindow>> createWindow(const WindowDesc& desc) override;

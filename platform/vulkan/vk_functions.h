@@ -62,6 +62,10 @@ namespace glint::vulkan {
     X(GetAccelerationStructureBuildSizesKHR) X(GetAccelerationStructureDeviceAddressKHR) \
     X(CmdBuildAccelerationStructuresKHR) X(CmdCopyAccelerationStructureKHR) \
     X(CmdWriteAccelerationStructuresPropertiesKHR)
+
+#define GLINT_VULKAN_TRAVERSAL_FUNCTIONS(X) \
+    X(CreateRayTracingPipelinesKHR) X(GetRayTracingShaderGroupHandlesKHR) X(CmdTraceRaysKHR) \
+    X(CmdTraceRaysIndirectKHR)
 // clang-format on
 
 #define GLINT_VULKAN_MEMBER(name) PFN_vk##name name = nullptr;
@@ -86,12 +90,13 @@ struct InstanceFunctions {
     void load(PFN_vkGetInstanceProcAddr get, VkInstance instance);
 };
 
-/// Functions of one device. Those of swapchains and acceleration structures are nullptr where the device does not
-/// enable them.
+/// Functions of one device. Those of swapchains, acceleration structures and ray-tracing pipelines are nullptr where
+/// the device does not enable them.
 struct DeviceFunctions {
     GLINT_VULKAN_DEVICE_FUNCTIONS(GLINT_VULKAN_MEMBER)
     GLINT_VULKAN_SWAPCHAIN_FUNCTIONS(GLINT_VULKAN_MEMBER)
     GLINT_VULKAN_TRACING_FUNCTIONS(GLINT_VULKAN_MEMBER)
+    GLINT_VULKAN_TRAVERSAL_FUNCTIONS(GLINT_VULKAN_MEMBER)
 
     void load(PFN_vkGetDeviceProcAddr get, VkDevice device);
 };

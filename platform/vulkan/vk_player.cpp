@@ -7,6 +7,7 @@
 #include "platform/vulkan/vk_query.h"
 #include "platform/vulkan/vk_result.h"
 #include "platform/vulkan/vk_texture.h"
+#include "platform/vulkan/vk_traversal.h"
 
 #include <glint/device/detail/object.h>
 
@@ -116,6 +117,8 @@ void Player::playList(const ResolvedList& resolved) {
     region_depth_ = 0;
     compute_.forget();
     graphics_.forget();
+    rays_.forget();
+    pushed_ = nullptr;
     vertices_ = nullptr;
     dynamic_ = nullptr;
     index_size_ = 0;
@@ -146,6 +149,8 @@ void Player::playCommand(const CommandHeader& header) {
         case CommandType::Dispatch: return play(as<DispatchCommand>(header));
         case CommandType::DispatchIndirect: return play(as<DispatchIndirectCommand>(header));
         case CommandType::SideDispatches: return play(as<SideDispatchesCommand>(header));
+        case CommandType::TraceRays: return play(as<TraceRaysCommand>(header));
+        case CommandType::TraceRaysIndirect: return play(as<TraceRaysIndirectCommand>(header));
         case CommandType::BeginTarget: return play(as<BeginTargetCommand>(header));
         case CommandType::EndTarget: return play(as<EndTargetCommand>(header));
         case CommandType::Draw:
@@ -196,6 +201,25 @@ void Player::play(const SideDispatchesCommand& command) {
         if (!bind(compute_, kernel.layout(), dispatch.bindings)) return;
         vk_.CmdDispatch(commands_, dispatch.groups, 1, 1);
     }
+}
+
+void Player::play(const TraceRaysCommand& command) {
+    const auto& traversal = native<VulkanTraversal>(command.traversal);
+    bindPipeline(rays_, traversal.handle());
+    if (!bind(rays_, traversal.layout(), command.bindings)) return;
+    const VkStridedDeviceAddressRegionKHR generation = traversal.generation(command.generation);
+    vk_.CmdTraceRaysKHR(commands_, &generation, &traversal.table(RayTable::Miss), &traversal.table(RayTable::Hit),
+                        &traversal.table(RayTable::Callable), command.rays[0], command.rays[1], command.rays[2]);
+}
+
+void Player::play(const TraceRaysIndirectCommand& command) {
+    const auto& traversal = native<VulkanTraversal>(command.traversal);
+    bindPipeline(rays_, traversal.handle());
+    if (!bind(rays_, traversal.layout(), command.bindings)) return;
+    const VkStridedDeviceAddressRegionKHR generation = traversal.generation(command.generation);
+    vk_.CmdTraceRaysIndirectKHR(commands_, &generation, &traversal.table(RayTable::Miss),
+                                &traversal.table(RayTable::Hit), &traversal.table(RayTable::Callable),
+                                buffer(command.buffer).address + command.offset);
 }
 
 Player::StageScope Player::scope(StageMask mask) const {

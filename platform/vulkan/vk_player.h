@@ -101,6 +101,8 @@ private:
     void play(const detail::DispatchCommand& command);
     void play(const detail::DispatchIndirectCommand& command);
     void play(const detail::SideDispatchesCommand& command);
+    void play(const detail::TraceRaysCommand& command);
+    void play(const detail::TraceRaysIndirectCommand& command);
 
     VulkanBuffer& buffer(uint32_t resource) const;
     VulkanTexture& texture(uint32_t resource) const;
@@ -127,6 +129,8 @@ private:
 
     BindPoint compute_{VK_PIPELINE_BIND_POINT_COMPUTE};
     BindPoint graphics_{VK_PIPELINE_BIND_POINT_GRAPHICS};
+    BindPoint rays_{VK_PIPELINE_BIND_POINT_RAY_TRACING_KHR};
+    const BindPoint* pushed_ = nullptr;  ///< whose push constants the command buffer has
     const detail::BeginTargetCommand* target_ = nullptr;
     uint32_t splits_left_ = 0;
     const detail::VertexBinding* vertices_ = nullptr;

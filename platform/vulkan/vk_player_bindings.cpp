@@ -55,10 +55,12 @@ bool Player::bind(BindPoint& point, const PipelineLayout& layout, const Bindings
     if (layout.push_size) {
         const std::byte* push = list_->at<std::byte>(bindings.push);
         const uint32_t size = std::min(layout.push_size, bindings.push_size);
-        if (!sameBytes(push, point.push, size)) {
+        // Dispatches and rays of one list share the command buffer's push constants.
+        if (pushed_ != &point || !sameBytes(push, point.push, size)) {
             vk_.CmdPushConstants(commands_, layout.handle, layout.push_stages, 0, size, push);
         }
         point.push = push;
+        pushed_ = &point;
     }
     if (layout.elements.empty()) return true;
 

@@ -49,6 +49,7 @@ struct NativeTexture : Native {
 struct NativeSampler : Native {};
 struct NativeKernel : Native {};
 struct NativePipeline : Native {};
+struct NativeTraversal : Native {};
 struct NativeQuery : Native {};
 
 struct NativeTracing : Native {
@@ -176,6 +177,31 @@ struct PipelineDesc {
     std::string name;
 };
 
+/// The tables of a ray-tracing pipeline's records.
+enum class RayTable : uint8_t { Generation, Miss, Hit, Callable, Count };
+constexpr size_t ray_tables = static_cast<size_t>(RayTable::Count);
+
+/// A ray-tracing pipeline with its binding table, which the back end writes before the pipeline is used.
+struct TraversalDesc {
+    /// Indices into `stages`: `general` alone (ray generation, miss, callable), or any of the others.
+    struct Group {
+        uint32_t general = none;
+        uint32_t closest = none;
+        uint32_t first_hit = none;
+        uint32_t intersection = none;
+    };
+    struct Record {
+        uint32_t group = 0;
+        std::span<const std::byte> data;
+    };
+    std::vector<StageDesc> stages;
+    std::vector<Group> groups;
+    std::array<std::vector<Record>, ray_tables> tables;
+    const BindingLayout* layout = nullptr;
+    uint32_t recursion_depth = 1;
+    std::string name;
+};
+
 struct TracingGeometry {
     uint32_t vertices = 0;
     Format vertex_format = FormatUnknown;
@@ -295,6 +321,7 @@ public:
     virtual Expected<std::unique_ptr<NativeSampler>> createSampler(const SamplerDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeKernel>> createKernel(const KernelDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativePipeline>> createPipeline(const PipelineDesc& desc) = 0;
+    virtual Expected<std::unique_ptr<NativeTraversal>> createTraversal(const TraversalDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeTracing>> createTracing(const NativeTracingDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeQuery>> createQuery(Query::Type type) = 0;
     /// Called with FeaturePresent only. Errors: "window.no_display", "window.create", "window.unsupported",

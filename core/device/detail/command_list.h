@@ -76,6 +76,8 @@ enum class CommandType : uint8_t {
     Dispatch,
     DispatchIndirect,
     SideDispatches,
+    TraceRays,
+    TraceRaysIndirect,
     BeginTarget,
     EndTarget,
     Draw,
@@ -172,6 +174,24 @@ struct SideDispatchesCommand {
     CommandHeader header;
     uint32_t dispatches = 0;  ///< byte offset in CommandList::bytes of an array of SideDispatch
     uint32_t count = 0;
+};
+
+/// Rays of a Traversal, from one of its ray-generation records.
+struct TraceRaysCommand {
+    CommandHeader header;
+    uint32_t traversal = 0;
+    uint32_t generation = 0;
+    Bindings bindings;
+    uint32_t rays[3] = {1, 1, 1};
+};
+
+struct TraceRaysIndirectCommand {
+    CommandHeader header;
+    uint32_t traversal = 0;
+    uint32_t generation = 0;
+    Bindings bindings;
+    uint32_t buffer = 0;
+    uint64_t offset = 0;
 };
 
 enum class LoadOperation : uint8_t { Load, Clear, Discard };

@@ -8,6 +8,7 @@
 #include <glint/device/detail/tracker.h>
 #include <glint/device/device.h>
 
+#include <atomic>
 #include <memory>
 #include <mutex>
 #include <source_location>
@@ -33,6 +34,9 @@ public:
     const DeviceInfo& info() const { return info_; }
     /// The heap of the software engine, null if the driver answers ray queries.
     TracingHeap* heap() const { return heap_.get(); }
+    /// From here on the driver builds structures beside the software engine.
+    void buildForTraversals() { traversals_.store(true, std::memory_order_relaxed); }
+    bool buildsForTraversals() const { return heap_ && traversals_.load(std::memory_order_relaxed); }
 
     /// Tells the message callback.
     void report(const Error& error, Message::Severity severity = Message::Severity::Error) const;
@@ -128,6 +132,7 @@ private:
     Features features_;
     DeviceInfo info_;
     std::shared_ptr<TracingHeap> heap_;
+    std::atomic<bool> traversals_ = false;
 
     std::mutex submit_mutex_;  // of tracker_, next_value_, scratch below, last_use of objects
     Tracker tracker_;

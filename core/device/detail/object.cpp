@@ -15,6 +15,7 @@ const char* toString(ObjectType type) {
         case ObjectType::Shader: return "shader";
         case ObjectType::Kernel: return "kernel";
         case ObjectType::Pipeline: return "pipeline";
+        case ObjectType::Traversal: return "traversal";
         case ObjectType::Target: return "target";
         case ObjectType::Tracing: return "tracing";
         case ObjectType::Query: return "query";

@@ -30,6 +30,7 @@ enum class ObjectType : uint8_t {
     Shader,
     Kernel,
     Pipeline,
+    Traversal,
     Target,
     Tracing,
     Query,
@@ -180,7 +181,7 @@ public:
     FileStamp file;  ///< of the file it was loaded from, no path if there is none
 };
 
-/// What a Kernel and a Pipeline have in common.
+/// What a Kernel, a Pipeline and a Traversal have in common.
 class ProgramObject : public Object {
 public:
     using Where = std::source_location;
@@ -202,6 +203,8 @@ public:
         StageDesc desc(size_t index) const;
     };
 
+    /// In the place of one of the same stage.
+    virtual void addShader(Ref<ShaderObject> shader);
     Status create(Where where);
     void createAsync(Where where);
     /// Returns once no createAsync is under way, and does its work itself if no thread has begun it yet.
@@ -279,6 +282,33 @@ private:
     Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) override;
 };
 
+class TraversalObject final : public ProgramObject {
+public:
+    struct Record {
+        uint32_t group = 0;
+        std::vector<std::byte> data;
+    };
+
+    explicit TraversalObject(DeviceObject* device) : ProgramObject(ObjectType::Traversal, device) {}
+    NativeTraversal* nativeTraversal() const { return static_cast<NativeTraversal*>(native.get()); }
+
+    /// Behind the others, into its group.
+    void addShader(Ref<ShaderObject> shader) override;
+    /// Those that were added, else one a group.
+    uint32_t countRecords(RayTable table) const {
+        const auto t = static_cast<size_t>(table);
+        return static_cast<uint32_t>(records[t].empty() ? groups[t].size() : records[t].size());
+    }
+
+    std::array<std::vector<TraversalDesc::Group>, ray_tables> groups;
+    std::array<std::vector<Record>, ray_tables> records;
+    uint32_t recursion_depth = 1;
+
+private:
+    Error checkRecords(Where where) const;
+    Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) override;
+};
+
 class QueryObject final : public Object {
 public:
     QueryObject(DeviceObject* device, Query::Type type) : Object(ObjectType::Query, device), query_type(type) {}
@@ -310,6 +340,8 @@ public:
     /// numbers when it was built. Guarded by the submit lock.
     uint64_t moves = 0;
     uint64_t built_moves = 0;
+    /// Software engine: the same structure as the driver builds it, for traversals (driver_tracing.h).
+    Ref<TracingObject> driver;
     ResourceState use;
 };
 

@@ -19,10 +19,24 @@ void RecorderCore::setKernel(const Kernel& kernel, Where where) {
     if (usable(kernel, "setKernel", where)) setProgram(*static_cast<KernelObject*>(kernel.object()));
 }
 
+void RecorderCore::setTraversal(const Traversal& traversal, uint32_t generation, Where where) {
+    if (!recording(where) || !onQueue(Queue::Compute, "setTraversal", where)) return;
+    auto* object = static_cast<TraversalObject*>(traversal.object());
+    if (traversal.state() == ObjectState::Building) object->waitCreated();
+    if (!usable(traversal, "setTraversal", where)) return;
+    if (const uint32_t count = object->countRecords(RayTable::Generation); generation >= count)
+        return fail(where, ErrorCode::OutOfRange, "traversal.generation",
+                    "setTraversal: ray-generation shader {} of {}, which has {}", generation, object->label(), count);
+    setProgram(*object);
+    ray_generation_ = generation;
+}
+
 void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Where where) {
     if (!recording(where)) return;
     if (!program_)
-        return fail(where, ErrorCode::InvalidArgument, "dispatch.kernel", "dispatch: no kernel has been set");
+        return fail(where, ErrorCode::InvalidArgument, "dispatch.kernel",
+                    "dispatch: no kernel or traversal has been set");
+    if (program_->type() == ObjectType::Traversal) return traceRays(width, height, depth, where);
     const auto& kernel = static_cast<const KernelObject&>(*program_);
     const Features& features = device_->features();
     const uint64_t threads[3] = {width, height, depth};
@@ -46,10 +60,42 @@ void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Whe
     std::copy(groups, groups + 3, command.groups);
 }
 
+void RecorderCore::traceRays(uint64_t width, uint64_t height, uint64_t depth, Where where) {
+    const Features& features = device_->features();
+    const uint64_t rays[3] = {width, height, depth};
+    // Vulkan bounds each side by that of a dispatch, in threads.
+    const uint64_t limits[3] = {uint64_t(features.maxGroupCountX) * features.maxGroupSizeX,
+                                uint64_t(features.maxGroupCountY) * features.maxGroupSizeY,
+                                uint64_t(features.maxGroupCountZ) * features.maxGroupSizeZ};
+    uint64_t left = features.maxRays;
+    for (size_t i = 0; i < 3; i++) {
+        if (rays[i] == 0) return;
+        left /= rays[i];
+    }
+    for (size_t i = 0; i < 3; i++)
+        if (left == 0 || rays[i] > std::min<uint64_t>(limits[i], UINT32_MAX))
+            return fail(where, ErrorCode::OutOfRange, "dispatch.rays",
+                        "dispatch: {} x {} x {} rays, the limits are {} x {} x {} and {} in all", width, height, depth,
+                        limits[0], limits[1], limits[2], features.maxRays);
+    if (!flushBindings("dispatch", where) || !flushPush("dispatch", where)) return;
+    beginAccesses();
+    auto& command = push<TraceRaysCommand>(CommandType::TraceRays);
+    shareAccesses(command.header);
+    command.traversal = program_resource_;
+    command.generation = ray_generation_;
+    command.bindings = bindings_;
+    std::copy(rays, rays + 3, command.rays);
+}
+
 void RecorderCore::dispatchIndirect(const Buffer& buffer, uint64_t offset, Where where) {
     if (!recording(where)) return;
     if (!program_)
-        return fail(where, ErrorCode::InvalidArgument, "dispatch.kernel", "dispatch: no kernel has been set");
+        return fail(where, ErrorCode::InvalidArgument, "dispatch.kernel",
+                    "dispatchIndirect: no kernel or traversal has been set");
+    const bool is_traversal = program_->type() == ObjectType::Traversal;
+    if (is_traversal && !device_->features().indirectRays)
+        return fail(where, ErrorCode::Unsupported, "dispatch.rays_indirect",
+                    "dispatchIndirect: {} takes no counts of rays from a buffer", device_->info().name);
     BufferObject* object = usableBuffer(buffer, Buffer::FlagIndirect, "dispatchIndirect", where);
     if (!object) return;
     if (offset % 4 || offset > object->size || object->size - offset < 12)
@@ -60,6 +106,16 @@ void RecorderCore::dispatchIndirect(const Buffer& buffer, uint64_t offset, Where
     const uint32_t resource = use(*object);
     beginAccesses();
     access(resource, Stage::Indirect, AccessRead);
+    if (is_traversal) {
+        auto& command = push<TraceRaysIndirectCommand>(CommandType::TraceRaysIndirect);
+        shareAccesses(command.header);
+        command.traversal = program_resource_;
+        command.generation = ray_generation_;
+        command.bindings = bindings_;
+        command.buffer = resource;
+        command.offset = offset;
+        return;
+    }
     auto& command = push<DispatchIndirectCommand>(CommandType::DispatchIndirect);
     shareAccesses(command.header);
     command.kernel = program_resource_;

@@ -66,6 +66,7 @@ public:
 
     // Compute.
     void setKernel(const Kernel& kernel, Where where);
+    void setTraversal(const Traversal& traversal, uint32_t generation, Where where);
     void dispatch(uint64_t width, uint64_t height, uint64_t depth, Where where);
     void dispatchIndirect(const Buffer& buffer, uint64_t offset, Where where);
     void setBufferData(const Buffer& buffer, uint64_t offset, const void* data, uint64_t size, Where where);
@@ -88,6 +89,8 @@ public:
     /// Builds that may run side by side, each with its scratch offset; checked by the caller.
     void buildTracings(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                        BufferObject& scratch, bool update, Where where);
+    /// Software engine: what has been built, or updated, as the driver builds it, if there are traversals.
+    void buildForTraversals(std::span<TracingObject* const> tracings, bool update, Where where);
     void copyTracing(TracingObject& destination, TracingObject& source, bool compact);
     void writeTracingSize(TracingObject& tracing);
     /// Makes what was copied to the buffer visible to the CPU after a wait.
@@ -207,6 +210,9 @@ private:
     }
 
     void writeInstances(TracingObject& tracing);
+    void buildByDriver(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
+                       BufferObject& scratch, bool update, Where where);
+    bool setDriverInstances(const TracingObject& from, TracingObject& twin);
     void buildInSoftware(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                          BufferObject& scratch, bool update, Where where);
     bool buildInstancesOnHost(TracingObject& tracing, Where where);
@@ -217,6 +223,7 @@ private:
     void playPending();
     /// Of the accesses that were begun.
     void copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size);
+    void traceRays(uint64_t width, uint64_t height, uint64_t depth, Where where);
     bool checkReferences(const TracingObject& tracing, Where where);
     void confirmBuild(TracingObject& tracing);
     uint64_t bindReferences(const ShaderResource& resource, Bound& bound);
@@ -226,6 +233,8 @@ private:
     bool flushBindings(const char* what, Where where);
     bool checkBound(const ShaderResource& resource, SlotKind kind, uint32_t slot, Bound& bound, const char* what,
                     Where where);
+    /// What a program's slot of structures reads: the driver's in ray-tracing pipelines.
+    TracingObject& tracedObject(const ShaderResource& resource, const Bound& bound) const;
     void accessBound(const ShaderResource& resource, SlotKind kind, const Bound& bound);
     bool flushPush(const char* what, Where where);
     void shareAccesses(CommandHeader& header) const;
@@ -248,6 +257,7 @@ private:
     std::vector<Use> uses_;
     ProgramObject* program_ = nullptr;  ///< the list keeps it alive
     uint32_t program_resource_ = 0;
+    uint32_t ray_generation_ = 0;
     bool bindings_dirty_ = true;
     bool uniforms_dirty_ = true;
     bool push_dirty_ = true;

@@ -1,5 +1,7 @@
 #include <glint/device/detail/recorder_core.h>
 
+#include <glint/device/detail/driver_tracing.h>
+
 #include <algorithm>
 #include <bit>
 #include <utility>
@@ -133,7 +135,13 @@ void RecorderCore::buildTracing(const Tracing& tracing, const Buffer& scratch, u
 void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                                  BufferObject& scratch, bool update, Where where) {
     if (!recording(where)) return;
-    if (device_->heap()) return buildInSoftware(tracings, offsets, scratch, update, where);
+    if (!device_->heap()) return buildByDriver(tracings, offsets, scratch, update, where);
+    buildInSoftware(tracings, offsets, scratch, update, where);
+    buildForTraversals(tracings, update, where);
+}
+
+void RecorderCore::buildByDriver(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
+                                 BufferObject& scratch, bool update, Where where) {
     const uint32_t scratch_resource = use(scratch);
     for (TracingObject* tracing : tracings)
         if (tracing->tracing_type == Tracing::TypeInstance) writeInstances(*tracing);
@@ -166,6 +174,51 @@ void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::
     command.header.untracked = false;
     command.builds = place;
     command.count = static_cast<uint32_t>(builds_.size());
+}
+
+void RecorderCore::buildForTraversals(std::span<TracingObject* const> tracings, bool update, Where where) {
+    if (!device_->buildsForTraversals()) return;
+    std::vector<TracingObject*> builds, refits;
+    uint64_t largest = 0;
+    uint64_t total = 0;
+    for (TracingObject* tracing : tracings) {
+        const Expected<TracingObject*> made = driverTracing(*tracing, where);
+        if (!made) return fail(made.error());
+        TracingObject& twin = **made;
+        if (!setDriverInstances(*tracing, twin)) continue;
+        // A top level may have other instances than it was built from.
+        const bool refit = update && twin.built && tracing->tracing_type != Tracing::TypeInstance;
+        (refit ? refits : builds).push_back(&twin);
+        const NativeTracing& native = *twin.nativeTracing();
+        const uint64_t size = std::max(refit ? native.update_size : native.build_size, uint64_t(1));
+        largest = std::max(largest, size);
+        total += size;
+    }
+    if (!recording(where) || largest == 0) return;
+    const Expected<Ref<BufferObject>> scratch = device_->acquireScratch(reasonableScratch(largest, total), where);
+    if (!scratch) return fail(scratch.error());
+    for (const bool update_batch : {false, true})
+        forEachBatch(update_batch ? refits : builds, (*scratch)->size, device_->features().scratchAlignment,
+                     [&](std::span<TracingObject* const> batch, std::span<const uint64_t> offsets) {
+                         buildByDriver(batch, offsets, **scratch, update_batch, where);
+                     });
+}
+
+bool RecorderCore::setDriverInstances(const TracingObject& from, TracingObject& twin) {
+    if (from.tracing_type != Tracing::TypeInstance) return true;
+    for (const Ref<TracingObject>& reference : from.references)
+        if (!reference->driver || !reference->driver->built) {
+            // Built before the first Traversal: the program is told when it lets one see the top level.
+            twin.built = false;
+            return false;
+        }
+    twin.instance_data = from.instance_data;
+    twin.instance_tracings.clear();
+    for (const TracingObject* bottom : from.instance_tracings)
+        twin.instance_tracings.push_back(bottom ? bottom->driver.get() : nullptr);
+    twin.references.clear();
+    for (const Ref<TracingObject>& reference : from.references) twin.references.push_back(reference->driver);
+    return true;
 }
 
 bool RecorderCore::checkReferences(const TracingObject& tracing, Where where) {

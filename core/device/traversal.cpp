@@ -1,0 +1,169 @@
+#include <glint/device/traversal.h>
+
+#include <glint/base/format_error.h>
+#include <glint/device/detail/device_object.h>
+
+#include <algorithm>
+
+namespace glint {
+
+namespace detail {
+
+namespace {
+
+using Group = TraversalDesc::Group;
+
+constexpr size_t hit_table = static_cast<size_t>(RayTable::Hit);
+
+const char* toString(RayTable table) {
+    switch (table) {
+        case RayTable::Generation: return "ray-generation";
+        case RayTable::Miss: return "miss";
+        case RayTable::Hit: return "hit";
+        case RayTable::Callable: return "callable";
+        case RayTable::Count: break;
+    }
+    return "unknown";
+}
+
+RayTable tableOf(ShaderStage stage) {
+    switch (stage) {
+        case ShaderStage::RayGen: return RayTable::Generation;
+        case ShaderStage::RayMiss: return RayTable::Miss;
+        case ShaderStage::Callable: return RayTable::Callable;
+        default: return RayTable::Hit;
+    }
+}
+
+uint32_t& memberOf(Group& group, ShaderStage stage) {
+    switch (stage) {
+        case ShaderStage::Closest: return group.closest;
+        case ShaderStage::FirstHit: return group.first_hit;
+        case ShaderStage::Intersection: return group.intersection;
+        default: return group.general;
+    }
+}
+
+}  // namespace
+
+void TraversalObject::addShader(Ref<ShaderObject> shader) {
+    const ShaderStage stage = shader->source.stage;
+    std::vector<Group>& table = groups[static_cast<size_t>(tableOf(stage))];
+    if (table.empty() || tableOf(stage) != RayTable::Hit || memberOf(table.back(), stage) != none) table.emplace_back();
+    memberOf(table.back(), stage) = static_cast<uint32_t>(shaders.size());
+    shaders.push_back(std::move(shader));
+}
+
+Error TraversalObject::checkRecords(Where where) const {
+    const uint32_t limit = device()->features().maxRecordSize;
+    for (size_t t = 0; t < ray_tables; t++)
+        for (size_t i = 0; i < records[t].size(); i++) {
+            const Record& record = records[t][i];
+            const char* table = toString(static_cast<RayTable>(t));
+            if (record.group >= groups[t].size())
+                return problem(
+                    where, ErrorCode::OutOfRange, "traversal.record_group",
+                    fmt::format("{} record {} is of group {}, there are {}", table, i, record.group, groups[t].size()));
+            if (record.data.size() > limit)
+                return problem(where, ErrorCode::OutOfRange, "traversal.record_size",
+                               fmt::format("{} record {} has {} bytes of data, the device takes {}", table, i,
+                                           record.data.size(), limit));
+        }
+    return {};
+}
+
+Expected<std::unique_ptr<Native>> TraversalObject::createNative(const Stages& stages, Where where) {
+    if (groups[static_cast<size_t>(RayTable::Generation)].empty())
+        return unexpected(
+            problem(where, ErrorCode::InvalidArgument, "program.stage", "there is no ray-generation shader"));
+    if (const uint32_t limit = device()->features().recursionDepth; recursion_depth > limit)
+        return unexpected(problem(where, ErrorCode::OutOfRange, "traversal.recursion",
+                                  fmt::format("recursion depth {}, the device's limit is {}", recursion_depth, limit)));
+    if (Error error = checkRecords(where)) return unexpected(error);
+
+    TraversalDesc desc;
+    for (size_t i = 0; i < stages.shaders.size(); i++) desc.stages.push_back(stages.desc(i));
+    for (size_t t = 0; t < ray_tables; t++) {
+        const auto first = static_cast<uint32_t>(desc.groups.size());
+        desc.groups.insert(desc.groups.end(), groups[t].begin(), groups[t].end());
+        for (const Record& record : records[t]) desc.tables[t].push_back({first + record.group, record.data});
+        if (!records[t].empty()) continue;
+        for (uint32_t i = 0; i < groups[t].size(); i++) desc.tables[t].push_back({first + i, {}});
+    }
+    desc.layout = &layout;
+    desc.recursion_depth = recursion_depth;
+    desc.name = name();
+    auto made = device()->backend->createTraversal(desc);
+    if (!made) return unexpected(made.error().at(where).named(name()));
+    return std::move(*made);
+}
+
+}  // namespace detail
+
+namespace {
+
+using detail::RayTable;
+using detail::TraversalObject;
+
+TraversalObject* configurable(detail::Object* object, Program::Where where) {
+    auto* traversal = static_cast<TraversalObject*>(object);
+    return traversal && traversal->configurable(where) ? traversal : nullptr;
+}
+
+uint32_t addRecord(detail::Object* object, RayTable table, uint32_t group, const void* data, uint64_t size,
+                   Program::Where where) {
+    TraversalObject* traversal = configurable(object, where);
+    if (!traversal) return 0;
+    // Refused at once: nobody wants a copy of what cannot be.
+    if (const uint32_t limit = traversal->device()->features().maxRecordSize; size > limit || (size && !data)) {
+        traversal->fail(traversal->problem(where, ErrorCode::OutOfRange, "traversal.record_size",
+                                           fmt::format("a record has {} bytes of data at {}, the device takes {}", size,
+                                                       data ? "an address" : "a null pointer", limit)));
+        return 0;
+    }
+    const auto* bytes = static_cast<const std::byte*>(data);
+    auto& records = traversal->records[static_cast<size_t>(table)];
+    records.push_back({group, std::vector<std::byte>(bytes, bytes + size)});
+    return static_cast<uint32_t>(records.size() - 1);
+}
+
+uint32_t countRecords(detail::Object* object, RayTable table) {
+    return object ? static_cast<const TraversalObject*>(object)->countRecords(table) : 0;
+}
+
+}  // namespace
+
+Traversal& Traversal::addHitGroup(Where where) {
+    if (TraversalObject* traversal = configurable(object_, where)) traversal->groups[detail::hit_table].emplace_back();
+    return *this;
+}
+
+Traversal& Traversal::setRecursionDepth(uint32_t depth, Where where) {
+    if (TraversalObject* traversal = configurable(object_, where)) traversal->recursion_depth = depth;
+    return *this;
+}
+
+uint32_t Traversal::addHitRecord(uint32_t group, const void* data, uint64_t size, Where where) {
+    return addRecord(object_, RayTable::Hit, group, data, size, where);
+}
+uint32_t Traversal::addMissRecord(uint32_t group, const void* data, uint64_t size, Where where) {
+    return addRecord(object_, RayTable::Miss, group, data, size, where);
+}
+uint32_t Traversal::addCallableRecord(uint32_t group, const void* data, uint64_t size, Where where) {
+    return addRecord(object_, RayTable::Callable, group, data, size, where);
+}
+
+uint32_t Traversal::getGenerations() const { return countRecords(object_, RayTable::Generation); }
+uint32_t Traversal::getHitRecords() const { return countRecords(object_, RayTable::Hit); }
+uint32_t Traversal::getMissRecords() const { return countRecords(object_, RayTable::Miss); }
+uint32_t Traversal::getCallableRecords() const { return countRecords(object_, RayTable::Callable); }
+uint32_t Traversal::getHitGroups() const {
+    return object_
+               ? static_cast<uint32_t>(static_cast<const TraversalObject*>(object_)->groups[detail::hit_table].size())
+               : 0;
+}
+uint32_t Traversal::getRecursionDepth() const {
+    return object_ ? static_cast<const TraversalObject*>(object_)->recursion_depth : 0;
+}
+
+}  // namespace glint

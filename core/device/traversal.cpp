@@ -54,22 +54,64 @@ void TraversalObject::addShader(Ref<ShaderObject> shader) {
     shaders.push_back(std::move(shader));
 }
 
-Error TraversalObject::checkRecords(Where where) const {
-    const uint32_t limit = device()->features().maxRecordSize;
+Error TraversalObject::checkRecords(const Stages& stages, Where where) const {
+    const auto recordSize = [&](uint32_t shader) {
+        return shader == none ? 0 : stages.shaders[shader]->compiled.reflection.record_size;
+    };
     for (size_t t = 0; t < ray_tables; t++)
-        for (size_t i = 0; i < records[t].size(); i++) {
-            const Record& record = records[t][i];
+        for (uint32_t i = 0; i < countRecords(static_cast<RayTable>(t)); i++) {
+            const Record* const added = records[t].empty() ? nullptr : &records[t][i];
+            const uint32_t index = added ? added->group : i;
+            const size_t size = added ? added->data.size() : 0;
             const char* table = toString(static_cast<RayTable>(t));
-            if (record.group >= groups[t].size())
+            if (index >= groups[t].size())
                 return problem(
                     where, ErrorCode::OutOfRange, "traversal.record_group",
-                    fmt::format("{} record {} is of group {}, there are {}", table, i, record.group, groups[t].size()));
-            if (record.data.size() > limit)
-                return problem(where, ErrorCode::OutOfRange, "traversal.record_size",
-                               fmt::format("{} record {} has {} bytes of data, the device takes {}", table, i,
-                                           record.data.size(), limit));
+                    fmt::format("{} record {} is of group {}, there are {}", table, i, index, groups[t].size()));
+            const Group& group = groups[t][index];
+            const uint32_t needed = std::max({recordSize(group.general), recordSize(group.closest),
+                                              recordSize(group.first_hit), recordSize(group.intersection)});
+            if (size < needed)
+                return problem(where, ErrorCode::InvalidArgument, "traversal.record_size",
+                               fmt::format("{} record {} has {} bytes of data, the shaders of its group {} read {}",
+                                           table, i, size, index, needed));
         }
     return {};
+}
+
+Error TraversalObject::checkVariables(const Stages& stages, Where where) const {
+    using Kind = RayVariable::Kind;
+    const uint32_t limit = device()->features().maxAttributeSize;
+    const auto forEach = [&](auto visit) {
+        for (const Ref<ShaderObject>& shader : stages.shaders)
+            for (const RayVariable& variable : shader->compiled.reflection.ray_variables)
+                visit(shader->source.stage, variable);
+    };
+    Error error;
+    forEach([&](ShaderStage stage, const RayVariable& variable) {
+        if (error) return;
+        if (variable.kind == Kind::Attribute && variable.size > limit)
+            error = problem(where, ErrorCode::OutOfRange, "traversal.attribute",
+                            fmt::format("hit attribute '{}' of the {} shader has {} bytes, the device takes {}",
+                                        variable.name, glint::toString(stage), variable.size, limit));
+        const bool is_payload = variable.kind == Kind::IncomingPayload;
+        if (!is_payload && variable.kind != Kind::IncomingCallable) return;
+        // Which caller it is, shaders decide as they run: there has to be one that fits.
+        std::string others;
+        bool fits = false;
+        forEach([&](ShaderStage caller, const RayVariable& sent) {
+            if (sent.kind != (is_payload ? Kind::Payload : Kind::Callable)) return;
+            fits |= sent.size == variable.size;
+            others += fmt::format("{}'{}' of the {} shader with {}", others.empty() ? "" : ", ", sent.name,
+                                  glint::toString(caller), sent.size);
+        });
+        if (fits || others.empty()) return;
+        error = problem(where, ErrorCode::InvalidArgument, "traversal.payload",
+                        fmt::format("{} '{}' of the {} shader has {} bytes, which no shader sends: there are {}",
+                                    glint::toString(variable.kind), variable.name, glint::toString(stage),
+                                    variable.size, others));
+    });
+    return error;
 }
 
 Expected<std::unique_ptr<Native>> TraversalObject::createNative(const Stages& stages, Where where) {
@@ -79,7 +121,8 @@ Expected<std::unique_ptr<Native>> TraversalObject::createNative(const Stages& st
     if (const uint32_t limit = device()->features().recursionDepth; recursion_depth > limit)
         return unexpected(problem(where, ErrorCode::OutOfRange, "traversal.recursion",
                                   fmt::format("recursion depth {}, the device's limit is {}", recursion_depth, limit)));
-    if (Error error = checkRecords(where)) return unexpected(error);
+    if (Error error = checkRecords(stages, where)) return unexpected(error);
+    if (Error error = checkVariables(stages, where)) return unexpected(error);
 
     TraversalDesc desc;
     for (size_t i = 0; i < stages.shaders.size(); i++) desc.stages.push_back(stages.desc(i));

@@ -1,4 +1,5 @@
 #include "shader_source.h"
+#include "spirv_module.h"
 
 #include <glint/base/format_error.h>
 
@@ -18,6 +19,7 @@ class Module : public spirv_cross::Compiler {
 public:
     using Compiler::Compiler;
     using Compiler::evaluate_constant_u32;
+    using Compiler::ir;
 };
 
 /// What SPIRV-Cross parses but Glint has no place for; turned into an error before it leaves this file.
@@ -56,6 +58,45 @@ uint32_t elementCount(const Module& module, const SPIRType& type) {
         count = std::min<uint64_t>(count * length, UINT32_MAX);
     }
     return static_cast<uint32_t>(count);
+}
+
+/// Bytes of all components, as if they were packed.
+uint32_t componentBytes(const Module& module, const SPIRType& type) {
+    uint64_t size = 0;
+    if (type.basetype == SPIRType::Struct) {
+        for (const spirv_cross::TypeID member : type.member_types) {
+            const SPIRType& part = module.get_type(member);
+            // A pointer may lead back to the structure it stands in.
+            size += part.pointer ? 8 : componentBytes(module, part);
+        }
+    } else {
+        const uint32_t width = type.basetype == SPIRType::Boolean ? 32 : type.width;
+        size = static_cast<uint64_t>(width / 8) * type.vecsize * type.columns;
+    }
+    return static_cast<uint32_t>(std::min<uint64_t>(size * elementCount(module, type), UINT32_MAX));
+}
+
+std::optional<RayVariable::Kind> rayKind(spv::StorageClass storage) {
+    switch (storage) {
+        case spv::StorageClassRayPayloadKHR: return RayVariable::Kind::Payload;
+        case spv::StorageClassIncomingRayPayloadKHR: return RayVariable::Kind::IncomingPayload;
+        case spv::StorageClassCallableDataKHR: return RayVariable::Kind::Callable;
+        case spv::StorageClassIncomingCallableDataKHR: return RayVariable::Kind::IncomingCallable;
+        case spv::StorageClassHitAttributeKHR: return RayVariable::Kind::Attribute;
+        default: return {};
+    }
+}
+
+/// Ids that instructions of functions name.
+std::vector<uint32_t> idsOfFunctions(std::span<const uint32_t> words) {
+    std::vector<uint32_t> ids;
+    const Expected<shader::SpirvModule> parts = shader::SpirvModule::parse(words);
+    if (!parts) return ids;
+    for (const shader::Instructions& function : parts->functions)
+        for (const shader::Instruction& instruction : function)
+            for (const uint16_t place : instruction.ids) ids.push_back(instruction.words[place]);
+    std::sort(ids.begin(), ids.end());
+    return ids;
 }
 
 bool hasRowMajor(const Module& module, const SPIRType& block) {
@@ -102,6 +143,19 @@ public:
         readCapabilities();
         const ShaderStage stage = reflection_.stage;
         if (stage == ShaderStage::Compute || stage == ShaderStage::Task || stage == ShaderStage::Mesh) readGroupSize();
+    }
+
+    void readRayVariables(std::span<const uint32_t> words) {
+        const std::vector<uint32_t> used = idsOfFunctions(words);
+        module_.ir.for_each_typed_id<spirv_cross::SPIRVariable>(
+            [&](uint32_t id, const spirv_cross::SPIRVariable& variable) {
+                const SPIRType& type = module_.get_type(variable.basetype);
+                if (variable.storage == spv::StorageClassShaderRecordBufferKHR)
+                    reflection_.record_size = static_cast<uint32_t>(module_.get_declared_struct_size(type));
+                const std::optional<RayVariable::Kind> kind = rayKind(variable.storage);
+                if (!kind || !std::binary_search(used.begin(), used.end(), id)) return;
+                reflection_.ray_variables.push_back({*kind, module_.get_name(id), componentBytes(module_, type)});
+            });
     }
 
 private:
@@ -285,7 +339,9 @@ Expected<Reflection> readModule(std::span<const uint32_t> words, ShaderStage sta
         Reflection reflection;
         reflection.stage = *found;
         reflection.entry = chosen->name;
-        Reader(module, reflection).read();
+        Reader reader(module, reflection);
+        reader.read();
+        if (*found >= ShaderStage::RayGen) reader.readRayVariables(words);
         return reflection;
     } catch (const std::exception& exception) {
         return unexpected(makeError(ErrorCode::ShaderCompile, "shader.reflect", "{}", exception.what()));
@@ -293,6 +349,17 @@ Expected<Reflection> readModule(std::span<const uint32_t> words, ShaderStage sta
 }
 
 }  // namespace
+
+const char* toString(RayVariable::Kind kind) {
+    switch (kind) {
+        case RayVariable::Kind::Payload: return "payload";
+        case RayVariable::Kind::IncomingPayload: return "incoming payload";
+        case RayVariable::Kind::Callable: return "callable data";
+        case RayVariable::Kind::IncomingCallable: return "incoming callable data";
+        case RayVariable::Kind::Attribute: return "hit attribute";
+    }
+    return "unknown";
+}
 
 Expected<Reflection> reflect(std::span<const uint32_t> words, std::string_view entry) {
     const std::vector<uint32_t> native = shader::nativeWords(words);

@@ -107,6 +107,17 @@ struct ShaderVariable {
     uint32_t components = 4;
 };
 
+/// A variable through which a stage of ray-tracing pipelines hands something to another one, or gets it. Its location
+/// is GLSL's alone: modules have none.
+struct RayVariable {
+    enum class Kind : uint8_t { Payload, IncomingPayload, Callable, IncomingCallable, Attribute };
+    Kind kind = Kind::Payload;
+    std::string name;
+    uint32_t size = 0;  ///< bytes of its components, without padding
+};
+/// "payload", "incoming payload", ...: the words messages use.
+const char* toString(RayVariable::Kind kind);
+
 /// Everything Glint reads off one SPIR-V module.
 struct Reflection {
     static constexpr uint32_t no_constant = ~0u;
@@ -116,6 +127,8 @@ struct Reflection {
     std::vector<SpecializationConstant> constants;
     std::vector<ShaderVariable> inputs;              ///< vertex stage: attributes
     std::vector<ShaderVariable> outputs;             ///< fragment stage: targets
+    std::vector<RayVariable> ray_variables;          ///< ray-tracing stages: those that functions use
+    uint32_t record_size = 0;                        ///< bytes of the shaderRecordEXT block, 0 if there is none
     uint32_t push_size = 0;                          ///< bytes of the push-constant block, 0 if there is none
     std::array<uint32_t, 3> group_size = {1, 1, 1};  ///< compute, task and mesh stages; constants at their defaults
     /// Id of the specialisation constant that sets this dimension of group_size, no_constant if it is fixed.

@@ -138,9 +138,14 @@ void visit(Archive& archive, Value& v) {
     archive(v.location, v.name, v.type, v.components);
 }
 
+template <class Archive, Is<RayVariable> Value>
+void visit(Archive& archive, Value& v) {
+    archive(v.kind, v.name, v.size);
+}
+
 template <class Archive, Is<Reflection> Value>
 void visit(Archive& archive, Value& v) {
-    archive(v.stage, v.entry, v.resources, v.hidden, v.constants, v.inputs, v.outputs, v.push_size, v.group_size,
+    archive(v.stage, v.entry, v.resources, v.hidden, v.constants, v.inputs, v.outputs, v.ray_variables, v.record_size, v.push_size, v.group_size,
             v.group_constants, v.uses_ray_query, v.uses_addresses, v.uses_float64, v.uses_int64, v.uses_subgroups);
 }
 

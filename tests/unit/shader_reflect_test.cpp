@@ -307,6 +307,46 @@ TEST_F(ShaderReflect, UsesOfFeatures) {
                     .uses_subgroups);
 }
 
+TEST_F(ShaderReflect, RayVariables) {
+    using Kind = RayVariable::Kind;
+    const Reflection sender = of("layout(binding = 0) uniform accelerationStructureEXT scene;\n"
+                                 "struct Part { vec3 a; bool b; };\n"
+                                 "struct Data { Part parts[2]; mat2x3 c; };\n"
+                                 "layout(location = 4) rayPayloadEXT Data data;\n"
+                                 "layout(location = 1) callableDataEXT uvec2 call;\n"
+                                 "layout(location = 2) rayPayloadEXT uint unused;\n"
+                                 "void main() {\n"
+                                 "    traceRayEXT(scene, 0u, 0xff, 0, 0, 0, vec3(0.0), 0.0, vec3(1.0), 1.0, 4);\n"
+                                 "    executeCallableEXT(0, 1);\n"
+                                 "}\n",
+                                 ShaderStage::RayGen);
+    EXPECT_FALSE(sender.uses_ray_query);
+    EXPECT_EQ(sender.record_size, 0u);
+    ASSERT_EQ(sender.ray_variables.size(), 2u);
+    for (const RayVariable& variable : sender.ray_variables) {
+        const bool is_data = variable.name == "data";
+        EXPECT_EQ(variable.kind, is_data ? Kind::Payload : Kind::Callable);
+        EXPECT_EQ(variable.size, is_data ? 2 * 16u + 24u : 8u);
+    }
+
+    const Reflection receiver = of("layout(shaderRecordEXT, std430) readonly buffer Record { uint a; vec4 b; };\n"
+                                   "layout(location = 0) rayPayloadInEXT double payload;\n"
+                                   "hitAttributeEXT vec2 barycentrics;\n"
+                                   "void main() { payload = double(barycentrics.x + b.x); }\n",
+                                   ShaderStage::Closest);
+    EXPECT_EQ(receiver.record_size, 32u);
+    ASSERT_EQ(receiver.ray_variables.size(), 2u);
+    for (const RayVariable& variable : receiver.ray_variables)
+        EXPECT_EQ(variable.kind, variable.name == "payload" ? Kind::IncomingPayload : Kind::Attribute);
+    EXPECT_EQ(receiver.ray_variables[0].size, 8u);
+    EXPECT_EQ(receiver.ray_variables[1].size, 8u);
+    EXPECT_EQ(
+        of("layout(location = 3) callableDataInEXT vec4 data;\nvoid main() { data.x = 1.0; }\n", ShaderStage::Callable)
+            .ray_variables.at(0)
+            .kind,
+        Kind::IncomingCallable);
+}
+
 TEST_F(ShaderReflect, ChoosesAmongEntryPoints) {
     const std::string text = "OpCapability Shader\nOpMemoryModel Logical GLSL450\n"
                              "OpEntryPoint GLCompute %a \"first\"\nOpEntryPoint GLCompute %b \"second\"\n"

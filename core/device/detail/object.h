@@ -305,7 +305,8 @@ public:
     uint32_t recursion_depth = 1;
 
 private:
-    Error checkRecords(Where where) const;
+    Error checkRecords(const Stages& stages, Where where) const;
+    Error checkVariables(const Stages& stages, Where where) const;
     Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) override;
 };
 

@@ -41,6 +41,17 @@ struct Shaders {
             rayQueryInitializeEXT(query, scene, 0u, 0xffu, vec3(0.0), 0.0, vec3(1.0), 1.0);
             values[gl_GlobalInvocationID.x] = rayQueryProceedEXT(query) ? 1u : 0u;
         })");
+    Shader generation = Shader::createGLSL(Shader::TypeRayGen, R"(
+        layout(binding = 0) uniform accelerationStructureEXT scene;
+        layout(binding = 1) buffer Values { uint values[]; };
+        layout(location = 0) rayPayloadEXT uint payload;
+        void main() {
+            traceRayEXT(scene, 0u, 0xff, 0, 0, 0, vec3(0.0), 0.0, vec3(1.0), 1.0, 0);
+            values[gl_LaunchIDEXT.x] = payload;
+        })");
+    Shader miss = Shader::createGLSL(Shader::TypeRayMiss, R"(
+        layout(location = 0) rayPayloadInEXT uint payload;
+        void main() { payload = 1u; })");
     Shader vertex = Shader::createGLSL(Shader::TypeVertex, R"(
         layout(location = 0) in vec4 position;
         void main() { gl_Position = position; })");
@@ -93,6 +104,14 @@ Outcome runScene(Device& device, bool careful) {
     Kernel trace = device.createKernel("trace");
     trace.setShader(shaders().trace);
     if (!good(trace.create())) return outcome;
+    Traversal rays;
+    if (device.getFeatures().rayTracing) {
+        rays = device.createTraversal("rays");
+        rays.setShader(shaders().generation);
+        rays.setShader(shaders().miss);
+        rays.addMissRecord(0, 1u);
+        if (!good(rays.create())) return outcome;
+    }
     Pipeline pipeline = device.createPipeline("pipeline");
     pipeline.setShader(shaders().vertex);
     pipeline.setShader(shaders().fragment);
@@ -123,6 +142,10 @@ Outcome runScene(Device& device, bool careful) {
     compute.setKernel(trace);
     compute.setTracing(0, top);
     compute.dispatch(64);
+    if (device.getFeatures().rayTracing) {
+        compute.setTraversal(rays);
+        compute.dispatch(64);
+    }
     compute.endQuery(query);
     Command command = device.createCommand(device.createTarget(picture), "command");
     command.setPipeline(pipeline);

@@ -1,0 +1,203 @@
+// Ray-tracing pipelines on the null device, whose checker judges what they read and write: with the driver's engine,
+// and beside the software engine.
+
+#include "support/matchers.h"
+
+#include <glint/device/device.h>
+#include <platform/null/null_control.h>
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <memory>
+#include <vector>
+
+namespace glint::test {
+namespace {
+
+using null::NullControl;
+using null::NullCounters;
+
+class TraversalOnNull : public testing::TestWithParam<TracingEngine> {
+protected:
+    void SetUp() override {
+        device = Device::create({.api = "null", .tracing = GetParam(), .message = [](const Message& message) {
+                                     ADD_FAILURE() << message.error.text();
+                                 }});
+        ASSERT_TRUE(device) << device.error().text();
+        control = NullControl::last();
+        traversal = device.createTraversal("traversal");
+        traversal.setShader(Shader::createGLSL(Shader::TypeRayGen, R"(
+layout(binding = 0) uniform accelerationStructureEXT scene;
+layout(binding = 1, std430) readonly buffer From { uint from[]; };
+layout(binding = 2, std430) writeonly buffer To { uint to[]; };
+layout(location = 0) rayPayloadEXT uint payload;
+void main() {
+    traceRayEXT(scene, 0u, 0xff, 0, 0, 0, vec3(0.0), 0.0, vec3(1.0), 1.0, 0);
+    to[gl_LaunchIDEXT.x] = from[gl_LaunchIDEXT.x] + payload;
+})"));
+        traversal.addHitGroup();
+        ASSERT_THAT(traversal.create(), IsOk());
+        vertices = device.createBuffer(Buffer::FlagTracing, 36, "vertices");
+        for (Buffer& buffer : buffers) {
+            buffer = device.createBuffer(Buffer::FlagStorage | Buffer::FlagIndirect, 64, "buffer");
+            ASSERT_TRUE(buffer);
+        }
+    }
+    void TearDown() override {
+        device = {};
+        traversal = {};
+        vertices = {};
+        for (Buffer& buffer : buffers) buffer = {};
+        EXPECT_EQ(control->counters().objects, 0u);
+        EXPECT_EQ(control->counters().bytes, 0u);
+        for (const Error& finding : control->findings()) ADD_FAILURE() << finding.text();
+    }
+
+    Tracing makeBottom(Tracing::Flags flags = Tracing::FlagFastTrace) {
+        Tracing bottom = device.createTracing("bottom");
+        bottom.addVertexBuffer(3, FormatRGBf32, 12, vertices);
+        EXPECT_THAT(bottom.create(Tracing::TypeTriangle, flags), IsOk());
+        device.buildTracing(bottom);
+        return bottom;
+    }
+    Tracing makeTop(const Tracing& bottom) {
+        Tracing top = device.createTracing({Tracing::Instance{.tracing = &bottom}});
+        device.buildTracing(top);
+        return top;
+    }
+    void trace(Compute& list, const Tracing& top, const Buffer& from, const Buffer& to) {
+        list.setTraversal(traversal);
+        list.setTracing(0, top);
+        list.setStorageBuffers(0, {from, to});
+        list.dispatch(16);
+    }
+    /// Memory barriers of a list.
+    template <class Record>
+    uint64_t barriers(Record&& record) {
+        EXPECT_THAT(device.flush(), IsOk());
+        const uint64_t before = control->counters().barriers;
+        Compute list = device.createCompute();
+        record(list);
+        EXPECT_THAT(device.submit(list), IsOk());
+        return control->counters().barriers - before;
+    }
+
+    Device device;
+    std::shared_ptr<NullControl> control;
+    Traversal traversal;
+    Buffer vertices;
+    std::array<Buffer, 3> buffers;
+};
+
+TEST_P(TraversalOnNull, RaysWaitForRays) {
+    const Tracing bottom = makeBottom();
+    const Tracing top = makeTop(bottom);
+    barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[1]); });
+    // Those that read what others read need not wait; those that read what others wrote do.
+    EXPECT_EQ(barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[2]); }), 0u);
+    EXPECT_EQ(barriers([&](Compute& list) {
+                  trace(list, top, buffers[2], buffers[1]);
+                  trace(list, top, buffers[2], buffers[0]);
+                  trace(list, top, buffers[0], buffers[2]);
+              }),
+              2u);
+}
+
+TEST_P(TraversalOnNull, RaysWaitForBuilds) {
+    const Tracing bottom = makeBottom(Tracing::FlagUpdate);
+    const Tracing top = makeTop(bottom);
+    for (int frame = 0; frame < 3; frame++) {
+        EXPECT_GT(barriers([&](Compute& list) {
+                      list.updateTracing(bottom);
+                      list.buildTracing(top);
+                      trace(list, top, buffers[0], buffers[1]);
+                  }),
+                  1u);
+        // Nothing has been built since.
+        EXPECT_EQ(barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[2]); }), 0u);
+    }
+}
+
+TEST_P(TraversalOnNull, CountsWaitForWhoWritesThem) {
+    const Tracing bottom = makeBottom();
+    const Tracing top = makeTop(bottom);
+    barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[1]); });
+    EXPECT_EQ(barriers([&](Compute& list) {
+                  list.clearBuffer(buffers[2]);
+                  list.setTraversal(traversal);
+                  list.setTracing(0, top);
+                  list.setStorageBuffers(0, {buffers[0], buffers[1]});
+                  list.dispatchIndirect(buffers[2], 16);
+              }),
+              // One for all: what the rays wrote, and the counts.
+              1u);
+}
+
+TEST_P(TraversalOnNull, TracesFollowWhatWasBuilt) {
+    Tracing first = makeBottom();
+    const Tracing second = makeBottom();
+    const Tracing top = makeTop(first);
+    const auto look = [&] { barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[1]); }); };
+    look();
+    const Tracing::Instance next = {.tracing = &second};
+    device.setTracing(top, {&next, 1});
+    first = {};
+    look();
+    device.buildTracing(top);
+    look();
+    EXPECT_THAT(device.finish(), IsOk());
+}
+
+TEST_P(TraversalOnNull, GoesWhenTheQueueHasPassedIt) {
+    const Tracing bottom = makeBottom();
+    Tracing top = makeTop(bottom);
+    EXPECT_THAT(device.finish(), IsOk());
+    control->hold(Queue::Main);
+    barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[1]); });
+    const uint64_t objects = control->counters().objects;
+    traversal = {};
+    EXPECT_EQ(control->counters().objects, objects);
+    top = {};
+    control->release(Queue::Main);
+    EXPECT_THAT(device.finish(), IsOk());
+    EXPECT_LT(control->counters().objects, objects - 1);
+}
+
+TEST_P(TraversalOnNull, CompactedStructuresAreTraced) {
+    Tracing bottom = device.createTracing("bottom");
+    bottom.addVertexBuffer(3, FormatRGBf32, 12, vertices);
+    ASSERT_THAT(bottom.create(Tracing::TypeTriangle, Tracing::FlagCompact | Tracing::FlagUpdate), IsOk());
+    Tracing top = device.createTracing({Tracing::Instance{.tracing = &bottom}});
+    ASSERT_THAT(device.buildTracings({bottom, top}, Tracing::FlagCompact), IsOk());
+    barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[1]); });
+    EXPECT_GT(barriers([&](Compute& list) {
+                  list.updateTracing(bottom);
+                  list.buildTracing(top);
+                  trace(list, top, buffers[0], buffers[1]);
+              }),
+              1u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Engines, TraversalOnNull, testing::Values(TracingEngine::Driver, TracingEngine::Software),
+                         [](const auto& test) { return std::string(toString(test.param)); });
+
+TEST(TraversalBesideNone, CostsNothing) {
+    // Only a device with a traversal has structures of the driver's beside the software engine's.
+    const auto count = [](bool with_traversal) {
+        Device device = Device::create({.api = "null", .tracing = TracingEngine::Software});
+        if (with_traversal) device.createTraversal();
+        const Buffer vertices = device.createBuffer(Buffer::FlagTracing, 36, "vertices");
+        Tracing bottom = device.createTracing("bottom");
+        bottom.addVertexBuffer(3, FormatRGBf32, 12, vertices);
+        EXPECT_THAT(bottom.create(Tracing::TypeTriangle), IsOk());
+        EXPECT_THAT(device.buildTracings({bottom}), IsOk());
+        EXPECT_THAT(device.finish(), IsOk());
+        return NullControl::last()->counters().builds;
+    };
+    EXPECT_EQ(count(false), 0u);
+    EXPECT_EQ(count(true), 1u);
+}
+
+}  // namespace
+}  // namespace glint::test

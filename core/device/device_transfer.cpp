@@ -141,12 +141,14 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
             if (object->flags & Tracing::FlagCompact) compacted.push_back(object);
     if (device.heap()) {
         if (Status status = device.buildOnHost(levels[0], where); !status) return status;
-        // They have no room to spare.
-        for (TracingObject* object : compacted) object->compacted = true;
         core->buildForTraversals(levels[0], false, where);
-        std::erase_if(compacted, [](TracingObject*& object) { return !(object = object->driver.get()); });
-        if (!device.buildsForTraversals()) compacted.clear();
-        if (Status status = device.compact(core, compacted, where); !status) return status;
+        std::vector<TracingObject*> of_driver;
+        for (TracingObject* object : compacted) {
+            // Ours have no room to spare.
+            object->compacted = true;
+            if (object->driver) of_driver.push_back(object->driver.get());
+        }
+        if (Status status = device.compact(core, of_driver, where); !status) return status;
     } else {
         build(levels[0]);
         if (Status status = device.compact(core, compacted, where); !status) return status;

@@ -14,7 +14,7 @@ class Object;
 /// What a handle stands for.
 enum class ObjectState : uint8_t {
     Null,      ///< no object
-    Building,  ///< being configured (a Kernel or Pipeline before create()), or created in the background
+    Building,  ///< being configured (a Kernel, Pipeline or Traversal before create()), or created in the background
     Ready,     ///< usable
     Failed,    ///< error() says why
 };

@@ -62,7 +62,7 @@ private:
 /// error is kept, told to the device's message callback, and returned by end() and submit(). One thread may record
 /// each; recorders of one device may be recorded at the same time.
 ///
-/// Bindings stay until they are replaced, also over a change of kernel or pipeline.
+/// Bindings stay until they are replaced, also over a change of kernel, pipeline or traversal.
 class Recorder {
 public:
     using Where = std::source_location;

@@ -39,7 +39,7 @@ public:
         return load(Shader::loadSPIRV(type, path, where), where);
     }
 
-    /// Begins the next hit group, empty so far. Hits of a group that stays empty run nothing.
+    /// Begins the next hit group, empty so far. If it stays empty, hits there run nothing, and boxes are never hit.
     Traversal& addHitGroup(Where where = Where::current());
 
     /// How deep traceRayEXT may nest: 1 traces from ray-generation shaders alone. More than Features::recursionDepth

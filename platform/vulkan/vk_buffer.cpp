@@ -8,9 +8,12 @@ namespace glint::vulkan {
 
 namespace {
 
-// Counts of rays are read by address.
-constexpr Buffer::Flags address_flags =
-    Buffer::FlagAddress | Buffer::FlagTracing | Buffer::FlagScratch | Buffer::FlagIndirect;
+bool hasAddress(Buffer::Flags flags, const FeatureChain& features) {
+    Buffer::Flags wanted = Buffer::FlagAddress | Buffer::FlagTracing | Buffer::FlagScratch;
+    // Counts of rays are read by address.
+    if (features.ray_pipeline.rayTracingPipelineTraceRaysIndirect) wanted |= Buffer::FlagIndirect;
+    return (flags & wanted) && features.v12.bufferDeviceAddress;
+}
 
 VkBufferUsageFlags bufferUsage(Buffer::Flags flags, const FeatureChain& features) {
     VkBufferUsageFlags usage = VK_BUFFER_USAGE_TRANSFER_SRC_BIT | VK_BUFFER_USAGE_TRANSFER_DST_BIT;
@@ -26,9 +29,7 @@ VkBufferUsageFlags bufferUsage(Buffer::Flags flags, const FeatureChain& features
     if ((flags & Buffer::FlagTracing) && features.structures.accelerationStructure) {
         usage |= VK_BUFFER_USAGE_ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_BIT_KHR;
     }
-    if ((flags & address_flags) && features.v12.bufferDeviceAddress) {
-        usage |= VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
-    }
+    if (hasAddress(flags, features)) usage |= VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
     return usage;
 }
 
@@ -68,7 +69,7 @@ std::unique_ptr<VulkanBuffer> VulkanBuffer::adopt(VulkanDevice& device, VkBuffer
 }
 
 void VulkanBuffer::readAddress(Buffer::Flags flags) {
-    if (!(flags & address_flags) || !device_.enabled.features.v12.bufferDeviceAddress) return;
+    if (!hasAddress(flags, device_.enabled.features)) return;
     const VkBufferDeviceAddressInfo info = {VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, nullptr, raw_.handle};
     address = device_.vk.GetBufferDeviceAddress(device_.handle, &info);
 }

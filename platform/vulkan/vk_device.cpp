@@ -71,9 +71,11 @@ Expected<std::unique_ptr<Backend>> VulkanDevice::adopt(const ForeignDevice& fore
     // Glint uses these wherever it may; whether it may here is not known.
     enabled.features.core.features.occlusionQueryPrecise = VK_FALSE;
     enabled.features.v12.hostQueryReset = VK_FALSE;
+    enabled.features.ray_pipeline.rayTracingPipelineTraceRaysIndirect = VK_FALSE;
     // Whoever made the instance hears its messages.
     std::unique_ptr<VulkanDevice> device(new VulkanDevice(std::move(instance), adapter, enabled, {}));
     device->owned = false;
+    device->features_.indirectRays = false;
     device->handle = foreign.device;
     if (Status status = device->createQueues(foreign.queue); !status) return unexpected(status.error());
     return device;

@@ -38,6 +38,10 @@ VkRayTracingShaderGroupCreateInfoKHR nativeGroup(const TraversalDesc::Group& gro
     return native;
 }
 
+bool isEmpty(const TraversalDesc::Group& group) {
+    return (group.general & group.closest & group.first_hit & group.intersection) == detail::none;
+}
+
 }  // namespace
 
 Expected<std::unique_ptr<VulkanTraversal>> VulkanTraversal::create(VulkanDevice& device, const TraversalDesc& desc) {
@@ -114,7 +118,9 @@ Status VulkanTraversal::writeTables(const TraversalDesc& desc) {
         VkStridedDeviceAddressRegionKHR& region = regions_[t];
         std::byte* place = bytes + region.deviceAddress;
         for (const TraversalDesc::Record& record : desc.tables[t]) {
-            std::memcpy(place, handles.data() + record.group * handle_size, handle_size);
+            // Zeros are no shaders, for triangles and boxes alike; an empty group would be for triangles alone.
+            if (!isEmpty(desc.groups[record.group]))
+                std::memcpy(place, handles.data() + record.group * handle_size, handle_size);
             if (!record.data.empty()) std::memcpy(place + handle_size, record.data.data(), record.data.size());
             place += region.stride;
         }

@@ -190,6 +190,22 @@ MISUSE(RaysCountedWithoutFlag, "buffer.flag") {
 MISUSE(RaysCountedBeyondTheEnd, "dispatch.indirect") {
     return traced(kit, [&](Compute& list) { list.dispatchIndirect(kit.buffer(Buffer::FlagIndirect, 16), 8); });
 }
+MISUSE(InstanceBeyondTheHitRecords, "traversal.hit_record") {
+    Traversal traversal = kit.device.createTraversal("traversal");
+    traversal.createShaderGLSL(Shader::TypeRayGen, tracing_generation);
+    traversal.addHitGroup();
+    traversal.addHitRecord(0);
+    traversal.addHitRecord(0);
+    EXPECT_THAT(traversal.create(), IsOk());
+    const Tracing triangle = kit.triangle();
+    const Tracing scene = kit.device.createTracing({Tracing::Instance{.tracing = &triangle, .offset = 2}});
+    EXPECT_THAT(kit.device.buildTracings({triangle, scene}), IsOk());
+    return kit.list([&](Compute& list) {
+        list.setTraversal(traversal);
+        list.setTracing(0, scene);
+        list.dispatch(1);
+    });
+}
 MISUSE(RaysOfABottomLevel, "bind.tracing_type") {
     const Tracing triangle = kit.triangle();
     return traced(kit, [&](Compute& list) { list.setTracing(0, triangle); });
@@ -197,8 +213,7 @@ MISUSE(RaysOfABottomLevel, "bind.tracing_type") {
 MISUSE(RaysOfAnUnbuiltScene, "bind.tracing_unbuilt") {
     const Tracing triangle = kit.triangle();
     const Tracing scene = kit.device.createTracing({Tracing::Instance{.tracing = &triangle}});
-    const Error error = traced(kit, [&](Compute& list) { list.setTracing(0, scene); });
-    return error;
+    return traced(kit, [&](Compute& list) { list.setTracing(0, scene); });
 }
 
 }  // namespace glint::test

@@ -210,6 +210,14 @@ TEST_F(TraversalStructures, BoxesAndTrianglesSideBySide) {
                         {}}});
     EXPECT_EQ(traversal.getHitGroups(), 2u);
     EXPECT_EQ(lookDown(traversal, scene, 4), (Words{2, 10, 11, 1}));
+    // An empty group is for either: the triangles are hit, the boxes are not.
+    const Traversal empty = makeTraversal(
+        {{Shader::TypeRayGen, look_down, {}}, {Shader::TypeRayMiss, setPayload("1u"), {}}}, [](Traversal& made) {
+            made.addHitGroup();
+            made.addHitRecord(0);
+            made.addHitRecord(0);
+        });
+    EXPECT_EQ(lookDown(empty, scene, 4), (Words{7, 1, 1, 1}));
 }
 
 TEST_F(TraversalStructures, ListsThatAreDroppedBuildNothing) {

@@ -45,9 +45,10 @@ Expected<TracingObject*> driverTracing(TracingObject& tracing, std::source_locat
 }
 
 const TracingObject* notBuiltByDriver(const TracingObject& tracing) {
+    if (tracing.driver && tracing.driver->built) return nullptr;
     for (const Ref<TracingObject>& reference : tracing.references)
         if (!reference->driver || !reference->driver->built) return reference.get();
-    return tracing.driver && tracing.driver->built ? nullptr : &tracing;
+    return &tracing;
 }
 
 }  // namespace glint::detail

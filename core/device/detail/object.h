@@ -331,6 +331,8 @@ public:
     uint32_t instances = 0;                         ///< capacity of a top level
     std::vector<Tracing::Instance> instance_data;   ///< set by setTracing; their `tracing` is not used
     std::vector<TracingObject*> instance_tracings;  ///< what they refer to, or nullptr
+    uint32_t largest_offset = 0;                    ///< of the instances that refer to something
+    uint32_t built_offset = 0;                      ///< of those that were built last
     std::vector<Ref<TracingObject>> references;     ///< the same, each once
     /// Those of the instances that were built last: what a trace reads, whatever has been set since.
     std::vector<Ref<TracingObject>> built_references;

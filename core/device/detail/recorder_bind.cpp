@@ -254,13 +254,20 @@ bool RecorderCore::checkBound(const ShaderResource& resource, SlotKind kind, uin
             return true;
         }
         case SlotKind::Tracing: {
-            if (!device_->heap() || resource.isRewritten()) return true;
+            if (program_->type() != ObjectType::Traversal) return true;
             const auto& tracing = *static_cast<const TracingObject*>(list_.resources[value.resource]);
-            if (const TracingObject* old = notBuiltByDriver(tracing))
+            const TracingObject* const old = device_->heap() ? notBuiltByDriver(tracing) : nullptr;
+            if (old)
                 return complain("tracing.traversal",
                                 "is {}; {} was built before the device's first Traversal, so that the driver knows "
                                 "nothing of it: build it again, and then what refers to it",
                                 tracing.label(), old == &tracing ? "it" : old->label());
+            // Without any hit record no shader is looked up.
+            const uint32_t records = static_cast<const TraversalObject*>(program_)->countRecords(RayTable::Hit);
+            if (records && tracing.built_offset >= records)
+                return complain("traversal.hit_record",
+                                "is {}, an instance of which has offset {}; there are {} hit records", tracing.label(),
+                                tracing.built_offset, records);
             return true;
         }
         default: return true;

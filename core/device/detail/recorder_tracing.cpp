@@ -36,6 +36,7 @@ void RecorderCore::setInstances(const Tracing& tracing, std::span<const Tracing:
     references_.clear();
     bottoms_.clear();
     bottoms_.reserve(instances.size());
+    uint32_t largest_offset = 0;
     for (size_t i = 0; i < instances.size(); i++) {
         const Tracing::Instance& instance = instances[i];
         const auto complain = [&](const char* id, const std::string& text) {
@@ -49,6 +50,7 @@ void RecorderCore::setInstances(const Tracing& tracing, std::span<const Tracing:
             return complain("tracing.instance_transform", "has a transform that is not finite");
         auto* bottom = instance.tracing ? static_cast<TracingObject*>(instance.tracing->object()) : nullptr;
         bottoms_.push_back(bottom);
+        if (bottom) largest_offset = std::max(largest_offset, instance.offset);
         if (!bottom || (!references_.empty() && references_.back() == bottom)) continue;
         if (bottom->state() != ObjectState::Ready || bottom->device() != device_)
             return complain("tracing.instance_failed",
@@ -66,6 +68,7 @@ void RecorderCore::setInstances(const Tracing& tracing, std::span<const Tracing:
         for (TracingObject* reference : references_) object->references.emplace_back(reference);
     }
     object->instance_tracings.swap(bottoms_);
+    object->largest_offset = largest_offset;
     object->instance_data.assign(instances.begin(), instances.end());
 }
 
@@ -239,6 +242,7 @@ void RecorderCore::confirmBuild(TracingObject& tracing) {
     if (!same) tracing.built_references = tracing.references;
     if (!tracing.built || !same) first_builds_.push_back(&tracing);
     tracing.built = true;
+    tracing.built_offset = tracing.largest_offset;
 }
 
 void RecorderCore::copyTracing(TracingObject& destination, TracingObject& source, bool compact) {

@@ -2,9 +2,8 @@
 
 // The scene of the tutorial in numbers, apart from how it is drawn: tests and benchmarks use it too.
 
-#include <glint/base/expected.h>
-#include <glint/geometry/primitives.h>
-#include <glint/geometry/refine.h>
+#include "common/torus.h"
+
 #include <glint/geometry/triangle_order.h>
 #include <glint/math/camera.h>
 
@@ -24,17 +23,9 @@ public:
     /// Longest side of the torus, and of every mesh in its place.
     static constexpr float mesh_size = 3.7f;
 
-    /// The torus: 16 x 11 quadrilaterals, refined by four steps to 90,112 triangles.
-    static glint::Expected<glint::Mesh> torus() {
-        const glint::Expected<glint::PolygonMesh> refined =
-            refine(glint::createTorusQuads(1.07208f, 0.77792f, 16, 11), glint::Subdivision::CatmullClark, 4);
-        if (!refined) return glint::unexpected(refined.error());
-        return toTriangles(*refined);
-    }
-
     /// The scene of a file's mesh, or of the torus if `path` is empty.
     static glint::Expected<InstancedScene> load(const std::filesystem::path& path, bool is_single) {
-        glint::Expected<glint::Mesh> mesh = path.empty() ? torus() : glint::Mesh::load(path);
+        glint::Expected<glint::Mesh> mesh = path.empty() ? refinedTorus() : glint::Mesh::load(path);
         if (!mesh) return glint::unexpected(mesh.error());
         InstancedScene scene;
         scene.mesh_ = std::move(*mesh);

@@ -41,8 +41,7 @@ std::vector<Order> ordersOf(const TracingScene& scene) {
         const auto other = static_cast<size_t>(random.below(i + 1));
         std::swap_ranges(&shuffled.indices[3 * i], &shuffled.indices[3 * i] + 3, &shuffled.indices[3 * other]);
     }
-    if (scene.name == "instances")
-        orders.push_back({".refinement", "refinement order", *check(InstancedScene::torus())});
+    if (scene.name == "instances") orders.push_back({".refinement", "refinement order", *check(refinedTorus())});
     orders.push_back({".shuffled", "shuffled", std::move(shuffled)});
     return orders;
 }

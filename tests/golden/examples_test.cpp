@@ -64,6 +64,25 @@ TEST(Golden, DeformedTori) {
                      {.texels = 400});
 }
 
+// Besides edges, those of shadows and of what the models mirror. The two forms have the same shading: they differ where
+// the driver's and Glint's triangle tests put a ray on other sides of an edge, which are rounding apart.
+TEST(Golden, TraversedTori) {
+    const TempDir folder;
+    const Expected<Image> pipeline = renderExample("06_hello_traversal", "--size 160x90 --time 3", folder);
+    const Expected<Image> query = renderExample("06_hello_traversal", "--size 160x90 --time 3 --query", folder);
+    ASSERT_TRUE(pipeline && query);
+    EXPECT_TRUE(matchesGolden(*pipeline, "06_hello_traversal", {.texels = 400}));
+    EXPECT_TRUE(imagesMatch(*query, *pipeline, "06_hello_traversal_query", {.texels = 72}));
+}
+
+// The course: pixels of edges and of shadows' edges, a tenth of which float64 finds on either side
+// (course_reference_test.cpp has all of them one by one).
+TEST(Golden, Course) {
+    for (const char* name : {"20_normals", "21_diffuse", "22_phong", "23_shadows", "24_reflections"})
+        for (const char* form : {"", " --query"})
+            expectGolden(name, std::string("--size 160x90") + form, name, {.texels = 15});
+}
+
 // A mesh of a file, and the fragment form.
 TEST(Golden, TracedBunny) {
     GLINT_NEED_BUNNY();

@@ -37,17 +37,23 @@ void copyIn(RTCGeometry geometry, RTCBufferType type, RTCFormat format, const st
     std::memcpy(place, values.data(), values.size() * sizeof(T));
 }
 
+RTCRay rayOf(const Ray& ray) {
+    RTCRay query = {};
+    query.org_x = ray.origin.x;
+    query.org_y = ray.origin.y;
+    query.org_z = ray.origin.z;
+    query.tnear = ray.t_min;
+    query.dir_x = ray.direction.x;
+    query.dir_y = ray.direction.y;
+    query.dir_z = ray.direction.z;
+    query.tfar = ray.t_max;
+    query.mask = 0xffffffff;
+    return query;
+}
+
 RayHit closestHit(RTCScene scene, const Ray& ray, uint32_t* instance) {
     RTCRayHit query = {};
-    query.ray.org_x = ray.origin.x;
-    query.ray.org_y = ray.origin.y;
-    query.ray.org_z = ray.origin.z;
-    query.ray.tnear = ray.t_min;
-    query.ray.dir_x = ray.direction.x;
-    query.ray.dir_y = ray.direction.y;
-    query.ray.dir_z = ray.direction.z;
-    query.ray.tfar = ray.t_max;
-    query.ray.mask = 0xffffffff;
+    query.ray = rayOf(ray);
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 #if RTC_VERSION_MAJOR >= 4
@@ -68,40 +74,80 @@ RayHit closestHit(RTCScene scene, const Ray& ray, uint32_t* instance) {
     return hit;
 }
 
+bool anyHit(RTCScene scene, const Ray& ray) {
+    RTCRay query = rayOf(ray);
+#if RTC_VERSION_MAJOR >= 4
+    rtcOccluded1(scene, &query);
+#else
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    rtcOccluded1(scene, &context, &query);
+#endif
+    return query.tfar < 0.0f;  // minus infinity
+}
+
+/// Calls `work` for 0 to count - 1, on this thread and others.
+template <class Work>
+void forEach(size_t count, uint32_t threads, const Work& work) {
+    constexpr size_t chunk = 4096;
+    std::atomic<size_t> next = 0;
+    const auto loop = [&] {
+        for (size_t begin = next.fetch_add(chunk); begin < count; begin = next.fetch_add(chunk))
+            for (size_t i = begin; i < std::min(count, begin + chunk); i++) work(i);
+    };
+    std::vector<std::thread> others;
+    for (uint32_t i = 1; i < threads; i++) others.emplace_back(loop);
+    loop();
+    for (std::thread& other : others) other.join();
+}
+
 }  // namespace
 
 struct EmbreeScene::Handles {
-    Holder<RTCDevice> device;
-    Holder<RTCScene> model;  ///< of instances
+    Holder<RTCDevice> device{rtcNewDevice(nullptr)};
+    std::vector<Holder<RTCScene>> models;  ///< of instances
     Holder<RTCScene> scene;
 
-    RTCScene createScene(EmbreeMode mode) const {
-        RTCScene made = rtcNewScene(device.get());
-        rtcSetSceneFlags(made, mode == EmbreeMode::Robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
-        rtcSetSceneBuildQuality(made, RTC_BUILD_QUALITY_MEDIUM);
+    Holder<RTCScene> createScene(EmbreeMode mode) const {
+        Holder<RTCScene> made(rtcNewScene(device.get()));
+        rtcSetSceneFlags(made.get(), mode == EmbreeMode::Robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE);
+        rtcSetSceneBuildQuality(made.get(), RTC_BUILD_QUALITY_MEDIUM);
+        return made;
+    }
+    Holder<RTCScene> createModel(const Mesh& mesh, EmbreeMode mode) const {
+        Holder<RTCScene> made = createScene(mode);
+        const Holder<RTCGeometry> geometry(rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
+        copyIn(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh.positions, sizeof(Vector3f));
+        copyIn(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.indices, 3 * sizeof(uint32_t));
+        rtcCommitGeometry(geometry.get());
+        rtcAttachGeometry(made.get(), geometry.get());
+        rtcCommitScene(made.get());
         return made;
     }
 };
 
 EmbreeScene::EmbreeScene(const Mesh& mesh, EmbreeMode mode, std::span<const Transform3x4> instances)
     : handles_(std::make_unique<Handles>()) {
-    handles_->device.reset(rtcNewDevice(nullptr));
-    handles_->scene.reset(handles_->createScene(mode));
-    RTCScene scene = handles_->scene.get();
-    const Holder<RTCGeometry> geometry(rtcNewGeometry(handles_->device.get(), RTC_GEOMETRY_TYPE_TRIANGLE));
-    copyIn(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, mesh.positions, sizeof(Vector3f));
-    copyIn(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.indices, 3 * sizeof(uint32_t));
-    rtcCommitGeometry(geometry.get());
-    rtcAttachGeometry(scene, geometry.get());
-    rtcCommitScene(scene);
-    if (instances.empty()) return;
+    if (instances.empty()) {
+        handles_->scene = handles_->createModel(mesh, mode);
+        return;
+    }
+    std::vector<EmbreeInstance> places;
+    for (const Transform3x4& transform : instances) places.push_back({0, transform});
+    const Mesh* only = &mesh;
+    EmbreeScene scene({&only, 1}, places, mode);
+    handles_ = std::move(scene.handles_);
+}
 
-    handles_->model = std::move(handles_->scene);
-    handles_->scene.reset(handles_->createScene(mode));
-    for (const Transform3x4& transform : instances) {
+EmbreeScene::EmbreeScene(std::span<const Mesh* const> meshes, std::span<const EmbreeInstance> instances,
+                         EmbreeMode mode)
+    : handles_(std::make_unique<Handles>()) {
+    for (const Mesh* mesh : meshes) handles_->models.push_back(handles_->createModel(*mesh, mode));
+    handles_->scene = handles_->createScene(mode);
+    for (const EmbreeInstance& place : instances) {
         const Holder<RTCGeometry> instance(rtcNewGeometry(handles_->device.get(), RTC_GEOMETRY_TYPE_INSTANCE));
-        rtcSetGeometryInstancedScene(instance.get(), handles_->model.get());
-        rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, transform.rows.data());
+        rtcSetGeometryInstancedScene(instance.get(), handles_->models[place.mesh].get());
+        rtcSetGeometryTransform(instance.get(), 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, place.transform.rows.data());
         rtcCommitGeometry(instance.get());
         rtcAttachGeometry(handles_->scene.get(), instance.get());
     }
@@ -118,17 +164,13 @@ std::vector<RayHit> EmbreeScene::cast(std::span<const Ray> rays) const {
 
 void EmbreeScene::cast(std::span<const Ray> rays, std::span<RayHit> hits, uint32_t threads,
                        std::span<uint32_t> instances) const {
-    constexpr size_t chunk = 4096;
-    std::atomic<size_t> next = 0;
-    const auto work = [&] {
-        for (size_t begin = next.fetch_add(chunk); begin < rays.size(); begin = next.fetch_add(chunk))
-            for (size_t i = begin; i < std::min(rays.size(), begin + chunk); i++)
-                hits[i] = closestHit(handles_->scene.get(), rays[i], instances.empty() ? nullptr : &instances[i]);
-    };
-    std::vector<std::thread> others;
-    for (uint32_t i = 1; i < threads; i++) others.emplace_back(work);
-    work();
-    for (std::thread& other : others) other.join();
+    forEach(rays.size(), threads, [&](size_t i) {
+        hits[i] = closestHit(handles_->scene.get(), rays[i], instances.empty() ? nullptr : &instances[i]);
+    });
+}
+
+void EmbreeScene::castAny(std::span<const Ray> rays, std::span<uint8_t> hits, uint32_t threads) const {
+    forEach(rays.size(), threads, [&](size_t i) { hits[i] = anyHit(handles_->scene.get(), rays[i]) ? 1 : 0; });
 }
 
 std::string embreeName() { return fmt::format("Embree {}", RTC_VERSION_STRING); }

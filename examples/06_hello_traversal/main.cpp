@@ -34,18 +34,21 @@ MeshModel::BufferCallback appendTo(std::vector<uint8_t>& bytes) {
 int main(int argc, char** argv) {
     Example example(EXAMPLE_NAME, "Traces reflections and shadows of 163 instances through a ray-tracing pipeline.");
     std::filesystem::path mesh_path;
-    bool use_query = false;
+    bool use_query = false, is_primary = false;
     example.add("--mesh", mesh_path, "Model to show (.obj, .ply, .gltf, .glb); a torus without it");
     example.add("--query", use_query, "Trace by ray queries in a compute shader instead of a ray-tracing pipeline");
+    example.add("--primary", is_primary, "No shadows and no reflections, as on devices whose traces do not nest");
     if (!example.parse(argc, argv)) return example.exitCode();
 
     const Expected<TraversalScene> places = TraversalScene::load(mesh_path);
     if (!places) return report(places.error());
-    Device device = openDevice(example, use_query ? FeatureComputeTracing : FeatureRayTracing);
+    Device device = openDevice(example, FeatureComputeTracing);
     if (!device) return report(device.error());
+    use_query = use_query || needsQueries(example, device, 1);
 
     // Where shaders cannot trace from shaders, there are no shadows and no reflections.
-    const uint32_t recursion = use_query ? 2u : std::min(device.getFeatures().recursionDepth, 2u);
+    const uint32_t most = use_query ? 2u : std::min(device.getFeatures().recursionDepth, 2u);
+    const uint32_t recursion = is_primary ? 1u : most;
     Shader::setMacro("RECURSION_DEPTH", static_cast<int>(recursion));
     const char* shader = EXAMPLE_DIR "/main.shader";
     Kernel kernel;
@@ -147,7 +150,7 @@ int main(int argc, char** argv) {
                          {"triangles", triangle_count},
                          {"vertices", vertex_count},
                          {"tracing_bytes", tracing_bytes}};
-    // Of the camera; each that hits is followed by a reflection and a shadow's ray.
+    // Of the camera; a hit is followed by a reflection and a shadow's ray.
     statistics.setRays("trace", 1ull * statistics.width * statistics.height);
     std::printf("%llu geometries, %llu triangles, %llu vertices; %zu instances\n",
                 static_cast<unsigned long long>(geometries), static_cast<unsigned long long>(triangle_count),

@@ -101,14 +101,7 @@ int Course::run(uint32_t recursion, const std::function<void(Traversal&)>& load,
     if (!stage) return report(stage.error());
     Device device = openDevice(example_, FeatureComputeTracing);
     if (!device) return report(device.error());
-    const Features& features = device.getFeatures();
-    if (!use_query_ && (!features.rayTracing || features.recursionDepth < recursion)) {
-        std::fprintf(stderr,
-                     "%s: ray queries: '%s' has no ray-tracing pipelines that nest "
-                     "%u deep\n",
-                     example_.name().c_str(), device.getInfo().name.c_str(), recursion);
-        use_query_ = true;
-    }
+    use_query_ = use_query_ || needsQueries(example_, device, recursion);
 
     // Before the structures, which are built for the programs that the device
     // has.

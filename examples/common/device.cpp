@@ -1,5 +1,7 @@
 #include "common/device.h"
 
+#include <cstdio>
+
 using namespace glint;
 
 Device openDevice(Example& example, FeatureMask required) {
@@ -17,6 +19,14 @@ Device openDevice(Example& example, FeatureMask required) {
     for (uint32_t i = 0; i < FeatureCount; i++)
         if (device.getFeatures().has(1ull << i)) statistics.features.push_back(featureNames(1ull << i));
     return device;
+}
+
+bool needsQueries(const Example& example, const Device& device, uint32_t recursion) {
+    const Features& features = device.getFeatures();
+    if (features.rayTracing && features.recursionDepth >= recursion) return false;
+    std::fprintf(stderr, "%s: tracing by ray queries: '%s' has no ray-tracing pipelines whose traces nest %u deep\n",
+                 example.name().c_str(), device.getInfo().name.c_str(), recursion);
+    return true;
 }
 
 void PassTimer::begin(Recorder& recorder, const std::string& pass) {

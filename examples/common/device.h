@@ -12,6 +12,10 @@
 /// Opens the device that the arguments ask for and notes it in the statistics. On failure the handle carries the error.
 glint::Device openDevice(Example& example, glint::FeatureMask required = glint::FeatureNone);
 
+/// For examples with two forms, a ray-tracing pipeline and ray queries: true, and said on stderr, if the device has no
+/// pipelines whose traces nest `recursion` deep.
+bool needsQueries(const Example& example, const glint::Device& device, uint32_t recursion);
+
 /// Measures passes on the GPU for the statistics; does nothing on a device without time queries.
 class PassTimer {
 public:

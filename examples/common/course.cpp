@@ -31,7 +31,7 @@ Expected<CourseStage> CourseStage::load(const std::filesystem::path& path) {
     const BoundBox box = mesh->bounds();
     const Vector3f size = box.size(), center = box.center();
     const float factor = mesh_size / std::max({size.x, size.y, size.z, 1e-30f});
-    const Matrix4x4f pose = rotateZ(90.0f) * rotateX(90.0f) * scale(Vector3f(factor)) *
+    const Matrix4x4f pose = translate({0.0f, 0.0f, lift}) * rotateZ(90.0f) * rotateX(90.0f) * scale(Vector3f(factor)) *
                             translate(-Vector3f(center.x, center.y - 0.5f * size.y, center.z));
     stage.meshes_ = {std::move(*mesh), createPlane(floor_size)};
     stage.transforms_ = {Transform3x4(pose), Transform3x4()};

@@ -35,6 +35,7 @@ class CourseStage {
 public:
     static constexpr float mesh_size = 3.0f;  ///< longest side
     static constexpr float floor_size = 10.0f;
+    static constexpr float lift = 0.01f;  ///< over the floor, so that flat meshes do not lie in it
     static constexpr uint32_t object_mesh = 0, object_floor = 1, object_count = 2;
 
     /// Stands the mesh of a file, or a torus of 4,096 triangles if `path` is

@@ -93,7 +93,7 @@ TEST(CourseStage, StandsMeshesOnTheFloor) {
     for (const Vector3f& position : placed.positions)
         (void)box.add(transformPoint(stage->transform(CourseStage::object_mesh).matrix(), position));
     // Of X, which was Z; of Y, which was X; of Z, which was Y. Coordinates up to 107 are off by 2^-18, times 3 / 40.
-    const Vector3f low(-0.375f, -0.075f, 0.0f), high(0.375f, 0.075f, 3.0f);
+    const Vector3f low(-0.375f, -0.075f, CourseStage::lift), high(0.375f, 0.075f, 3.0f + CourseStage::lift);
     for (int i = 0; i < 3; i++) {
         EXPECT_NEAR(box.min[i], low[i], 1e-5f);
         EXPECT_NEAR(box.max[i], high[i], 1e-5f);

@@ -1,16 +1,18 @@
 // traversal.hello.{pipeline,query,embree}_{ms,mrays}: a frame of 06_hello_traversal at 1600 x 900, through the driver's
 // ray-tracing pipeline and by ray queries, as the example itself measures them, and the same rays through Embree, one
-// at a time on all processors. Each the best of some turns.
+// at a time on all processors. Each the best of some turns; on processors by processor time over the number of them.
 
 #include "06_hello_traversal/scene.h"
 #include "accuracy/embree.h"
-#include "bench/bench.h"
+#include "bench/tracing_batch.h"
 #include "support/files.h"
 
 #include <glint/base/file.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -21,12 +23,26 @@ namespace glint::bench {
 
 namespace {
 
-constexpr uint32_t width = 1600, height = 900, tile = 4;  // divides both
-constexpr uint32_t turns = 3, frames = 3;                 // in each turn
+constexpr uint32_t width = 1600, height = 900, tile = 4;
+constexpr uint32_t turns = 2, gpu_frames = 100, cpu_frames = 2;
 constexpr float nearest = 1e-3f, farthest = 1000.0f;
 
-/// Milliseconds of the fastest frame.
-double traceExample(const std::string& arguments, const test::TempDir& folder) {
+/// Seconds that the programs started so far have spent on processors.
+double childSeconds() {
+    rusage usage = {};
+    getrusage(RUSAGE_CHILDREN, &usage);
+    const auto seconds = [](const timeval& time) {
+        return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+    };
+    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+struct ExampleTimes {
+    double device = 0.0;  ///< milliseconds of the fastest frame
+    double process = 0.0;
+};
+
+ExampleTimes runExample(const std::string& arguments, uint32_t frames, const test::TempDir& folder) {
     const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
     const std::filesystem::path example = programs.parent_path() / "examples" / "06_hello_traversal";
     if (!std::filesystem::exists(example)) throw std::runtime_error(example.string() + " has not been built");
@@ -34,9 +50,19 @@ double traceExample(const std::string& arguments, const test::TempDir& folder) {
     const std::string command =
         fmt::format("'{}' --size {}x{} --time 0 --frames {} --stats '{}' {} > '{}'", example.string(), width, height,
                     frames, stats, arguments, (folder / "output").string());
+    const double begin = childSeconds();
     if (std::system(command.c_str()) != 0) throw std::runtime_error("failed: " + command);
+    const double seconds = childSeconds() - begin;
     const auto json = nlohmann::json::parse(check(readTextFile(stats)).value());
-    return json.at("passes").at(0).at("min_ns").get<double>() * 1e-6;
+    return {json.at("passes").at(0).at("min_ns").get<double>() * 1e-6, seconds};
+}
+
+/// Milliseconds of a frame: by the device's clock, or, where the device is the processor, by the processor time of
+/// frames after the first, so that what other programs do is left out.
+double traceExample(const std::string& arguments, const Device& device, uint32_t threads, const test::TempDir& folder) {
+    if (!device.getInfo().cpu) return runExample(arguments, gpu_frames, folder).device;
+    const double first = runExample(arguments, 1, folder).process;
+    return (runExample(arguments, 1 + cpu_frames, folder).process - first) * 1e3 / (cpu_frames * threads);
 }
 
 struct RaySets {
@@ -97,15 +123,13 @@ void run(Report& report) {
     constexpr double never = std::numeric_limits<double>::infinity();
     double pipeline = never, query = never, theirs = never;
     for (uint32_t turn = 0; turn < turns; turn++) {
-        if (device.getFeatures().rayTracing) pipeline = std::min(pipeline, traceExample("", folder));
-        query = std::min(query, traceExample("--query", folder));
-        for (uint32_t frame = 0; frame < frames; frame++) {
-            const double begin = wallSeconds();
-            embree.cast(rays.primary, hits, threads);
-            embree.cast(rays.reflection, hits, threads);
-            embree.castAny(rays.shadow, shadows, threads);
-            theirs = std::min(theirs, (wallSeconds() - begin) * 1e3);
-        }
+        if (device.getFeatures().rayTracing) pipeline = std::min(pipeline, traceExample("", device, threads, folder));
+        query = std::min(query, traceExample("--query", device, threads, folder));
+        const double begin = processSeconds();
+        embree.cast(rays.primary, hits, threads);
+        embree.cast(rays.reflection, hits, threads);
+        embree.castAny(rays.shadow, shadows, threads);
+        theirs = std::min(theirs, (processSeconds() - begin) * 1e3 / threads);
     }
     const std::string against =
         fmt::format("{} single rays on {} threads, {}", test::embreeName(), threads, processorName());

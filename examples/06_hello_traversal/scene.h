@@ -119,19 +119,19 @@ inline glint::Expected<TraversalScene> TraversalScene::load(const std::filesyste
 
     TraversalScene scene;
     scene.meshes_ = {std::move(*model), dodecahedron(), glint::createPlane(plane_size, 8)};
+    const auto placeOf = [](uint32_t i, float offset) {
+        const uint32_t column = i % grid, row = i / grid;
+        return glint::Vector3f((static_cast<float>(column) - 0.5f * (grid - 1) + offset) * pitch,
+                               (static_cast<float>(row) - 0.5f * (grid - 1) + offset) * pitch, height);
+    };
     for (uint32_t i = 0; i < grid * grid; i++) {
-        const glint::Vector3f place((static_cast<float>(i % grid) - 0.5f * (grid - 1)) * pitch,
-                                    (static_cast<float>(i / grid) - 0.5f * (grid - 1)) * pitch, height);
         const glint::Matrix4x4f lean = path.empty()
                                            ? glint::rotateZ(40.0f * static_cast<float>(i)) * glint::rotateX(55.0f)
                                            : glint::Matrix4x4f(1.0f);
-        scene.instances_.push_back({mesh_model, glint::Transform3x4(glint::translate(place) * lean * pose)});
+        scene.instances_.push_back({mesh_model, glint::Transform3x4(glint::translate(placeOf(i, 0.0f)) * lean * pose)});
     }
-    for (uint32_t i = 0; i < grid * grid; i++) {
-        const glint::Vector3f place((static_cast<float>(i % grid) - 0.5f * (grid - 1) + 0.5f) * pitch,
-                                    (static_cast<float>(i / grid) - 0.5f * (grid - 1) + 0.5f) * pitch, height);
-        scene.instances_.push_back({mesh_dodecahedron, glint::Transform3x4(glint::translate(place))});
-    }
+    for (uint32_t i = 0; i < grid * grid; i++)
+        scene.instances_.push_back({mesh_dodecahedron, glint::Transform3x4(glint::translate(placeOf(i, 0.5f)))});
     scene.instances_.push_back({mesh_plane, glint::Transform3x4()});
     return scene;
 }

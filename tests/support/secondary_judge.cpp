@@ -90,6 +90,7 @@ bool isSamePrimary(const SecondaryResult& a, const SecondaryResult& b) {
 SecondaryCount& SecondaryCount::operator+=(const SecondaryCount& other) {
     rays += other.rays;
     acne += other.acne;
+    strays += other.strays;
     sure += other.sure;
     leaks += other.leaks;
     blocked += other.blocked;
@@ -119,27 +120,27 @@ SecondaryJudge::SecondaryJudge(const SecondaryCase& scene, std::span<const Secon
         const SecondaryResult& result = results[i];
         if (result.first == SecondaryResult::none) continue;
         const Vector3f to_lamp = samples[i].lamp - result.position;
-        if (result.shadow != SecondaryResult::not_traced)
-            shadows_[i] = pathOf(result, to_lamp, Vector3d(samples[i].lamp));
-        mirrors_[i] = pathOf(result, result.mirrored, Vector3d(1e300));
+        if (result.shadow != SecondaryResult::not_traced) shadows_[i] = pathOf(result, to_lamp, &samples[i].lamp);
+        mirrors_[i] = pathOf(result, result.mirrored, nullptr);
     }
 }
 
 SecondaryJudge::Path SecondaryJudge::pathOf(const SecondaryResult& result, const Vector3f& direction,
-                                            const Vector3d& to) const {
+                                            const Vector3f* lamp) const {
     Path path;
     path.own.instance = result.instance;
     path.own.triangle = result.first;
     const auto [a, b, c] = cornersOf(scene_.mesh, result.first);
     const Vector3d place = a + (b - a) * double(result.barycentrics.x) + (c - a) * double(result.barycentrics.y);
     path.from = transformed(places_[result.instance].to_world, place);
-    path.to = to.x == 1e300 ? path.from + Vector3d(direction) * double(scene_.reach) : to;
+    path.to = lamp ? Vector3d(*lamp) : path.from + Vector3d(direction) * double(scene_.reach);
     const SurfacePoint point = {result.position, result.normal, result.offset, result.slope};
     path.start = Vector3d(spawnPoint(point, direction));
     path.slope = result.slope;
     const double rise = glm::dot(Vector3d(result.normal), Vector3d(direction));
     path.side = rise < 0.0 ? -1.0 : 1.0;
-    path.climb = std::abs(rise) / largest(Vector3d(direction));
+    // A segment ends at its lamp, however high it starts.
+    path.climb = (std::abs(rise) - (lamp ? double(result.offset) : 0.0)) / largest(Vector3d(direction));
 
     for (uint32_t instance = 0; instance < places_.size(); instance++) {
         const Vector3d from = transformed(places_[instance].to_object, path.from);
@@ -189,9 +190,10 @@ double SecondaryJudge::tolerance(const Path& path, const Surface& surface) const
     return margin(path, surface) / std::max(std::abs(across), 1e-300);
 }
 
-// What docs/rays.md promises under "Its own triangle", "Its neighbours" and "At any distance".
+// What docs/rays.md promises under "Its own triangle", "Its neighbours" and "At any distance"; of segments, if the lamp
+// is higher over the plane than the offset.
 bool SecondaryJudge::isPromised(const Path& path, const Surface& surface) const {
-    if (surface.instance != path.own.instance) return false;
+    if (surface.instance != path.own.instance || path.climb < 0.0) return false;
     if (surface.triangle == path.own.triangle) return true;
     const auto own = cornersOf(scene_.mesh, path.own.triangle);
     const auto other = cornersOf(scene_.mesh, surface.triangle);
@@ -241,9 +243,12 @@ void SecondaryJudge::judge(const Path& path, Surface met, bool any, SecondaryCou
         const Matrix4x4d& to_object = places_[met.instance].to_object;
         const Meeting meeting(cornersOf(scene_.mesh, met.triangle), transformed(to_object, path.from),
                               transformed(to_object, path.to));
-        if (isPromised(path, met) || meeting.distance > margin(path, met)) {
+        if (isPromised(path, met)) {
             count.acne++;
             complain("it meets", met);
+        } else if (meeting.distance > margin(path, met)) {
+            count.strays++;
+            complain("it strays to", met);
         }
         met.tolerance = tolerance(path, met);
     }

@@ -14,16 +14,17 @@ namespace glint::test {
 
 struct SecondaryCount {
     uint64_t rays = 0;
-    /// Rays that meet the triangle they leave, or one that docs/rays.md promises they do not (flat and convex
-    /// neighbours), or one that the exact ray stays clear of.
+    /// Rays that meet the triangle they leave, or one that docs/rays.md promises they do not: flat and convex
+    /// neighbours.
     uint64_t acne = 0;
-    uint64_t sure = 0;   ///< rays that have to meet something, whatever rounding within the bounds does
-    uint64_t leaks = 0;  ///< of those, rays that did not, or met only what lies behind
+    uint64_t strays = 0;  ///< other rays that meet what the exact ray stays clear of
+    uint64_t sure = 0;    ///< rays that have to meet something, whatever rounding within the bounds does
+    uint64_t leaks = 0;   ///< of those, rays that did not, or met only what lies behind
     /// Rays that meet another triangle by float64, however near it is, and those of them that did not, or met only what
     /// lies behind. A ray that starts beyond what is nearer than its offset is one of these, and no leak.
     uint64_t blocked = 0;
     uint64_t lost = 0;
-    std::string first;  ///< of what is wrong: acne or leak
+    std::string first;  ///< acne, stray or leak
 
     SecondaryCount& operator+=(const SecondaryCount& other);
 };
@@ -72,13 +73,13 @@ private:
         Vector3d from, to;  ///< the exact ray, in the world
         Vector3d start;     ///< with the derived offset
         Surface own;
-        double climb = 0.0;  ///< height over its plane for each unit of its largest component
+        double climb = 0.0;  ///< height that it gains over the plane, for each unit of its largest component
         double slope = 0.0;
         double side = 1.0;  ///< -1 where it goes to the side from which the corners are clockwise
         Surface exact, sure;
     };
 
-    Path pathOf(const SecondaryResult& result, const Vector3f& direction, const Vector3d& to) const;
+    Path pathOf(const SecondaryResult& result, const Vector3f& direction, const Vector3f* lamp) const;
     double margin(const Path& path, const Surface& surface) const;
     double tolerance(const Path& path, const Surface& surface) const;
     bool isPromised(const Path& path, const Surface& surface) const;

@@ -75,6 +75,7 @@ Benchmark castBenchmark();
 Benchmark castMemoryBenchmark();
 Benchmark tracingLeaksBenchmark();
 Benchmark tracingTradeoffsBenchmark();
+Benchmark traversalOffsetBenchmark();
 Benchmark traversalHelloBenchmark();
 
 /// A failure that ends one benchmark and not the others.

@@ -87,6 +87,11 @@ bool isSamePrimary(const SecondaryResult& a, const SecondaryResult& b) {
 
 }  // namespace
 
+void SecondaryJudge::check(uint32_t triangle, uint32_t instance) const {
+    if (triangle >= scene_.mesh.triangleCount() || instance >= scene_.transforms.size())
+        throw std::runtime_error(fmt::format("there is no triangle {} of instance {}", triangle, instance));
+}
+
 SecondaryCount& SecondaryCount::operator+=(const SecondaryCount& other) {
     rays += other.rays;
     acne += other.acne;
@@ -119,6 +124,7 @@ SecondaryJudge::SecondaryJudge(const SecondaryCase& scene, std::span<const Secon
     for (size_t i = 0; i < samples.size(); i++) {
         const SecondaryResult& result = results[i];
         if (result.first == SecondaryResult::none) continue;
+        check(result.first, result.instance);
         const Vector3f to_lamp = samples[i].lamp - result.position;
         if (result.shadow != SecondaryResult::not_traced) shadows_[i] = pathOf(result, to_lamp, &samples[i].lamp);
         mirrors_[i] = pathOf(result, result.mirrored, nullptr);
@@ -218,7 +224,10 @@ SecondaryJudge::Counts SecondaryJudge::count(std::span<const SecondaryResult> re
         if (result.first == SecondaryResult::none) continue;
         Surface met;
         const auto meet = [&](uint32_t triangle, uint32_t instance, float t) {
-            met = {triangle == SecondaryResult::none ? triangle : instance, triangle, double(t) / scene_.reach, 0.0};
+            met = {};
+            if (triangle == SecondaryResult::none) return;
+            check(triangle, instance);
+            met = {instance, triangle, double(t) / scene_.reach, 0.0};
         };
         if (result.shadow != SecondaryResult::not_traced) {
             meet(result.shadow, result.shadow_instance, 0.0f);

@@ -54,7 +54,7 @@ public:
     struct Counts {
         SecondaryCount shadow, mirror;
     };
-    /// Throws std::runtime_error if the primary hits are others.
+    /// Throws std::runtime_error if the primary hits are others, or a hit names what is not there.
     Counts count(std::span<const SecondaryResult> results) const;
 
 private:
@@ -79,6 +79,7 @@ private:
         Surface exact, sure;
     };
 
+    void check(uint32_t triangle, uint32_t instance) const;
     Path pathOf(const SecondaryResult& result, const Vector3f& direction, const Vector3f* lamp) const;
     double margin(const Path& path, const Surface& surface) const;
     double tolerance(const Path& path, const Surface& surface) const;

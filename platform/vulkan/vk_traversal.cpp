@@ -59,11 +59,13 @@ Status VulkanTraversal::createPipeline(const TraversalDesc& desc) {
     layout_ = *layout;
     std::deque<StageModule> modules;
     std::vector<VkPipelineShaderStageCreateInfo> stages;
+    stages.reserve(desc.stages.size());
     for (const detail::StageDesc& stage : desc.stages) {
         if (Status status = modules.emplace_back(device_).create(stage); !status) return status;
         stages.push_back(modules.back().info);
     }
     std::vector<VkRayTracingShaderGroupCreateInfoKHR> groups;
+    groups.reserve(desc.groups.size());
     for (const TraversalDesc::Group& group : desc.groups) groups.push_back(nativeGroup(group));
 
     VkRayTracingPipelineCreateInfoKHR info = {VK_STRUCTURE_TYPE_RAY_TRACING_PIPELINE_CREATE_INFO_KHR};

@@ -16,7 +16,6 @@ namespace glint::test {
 namespace {
 
 using null::NullControl;
-using null::NullCounters;
 
 class TraversalOnNull : public testing::TestWithParam<TracingEngine> {
 protected:

@@ -256,7 +256,7 @@ TEST_F(TraversalTest, MasksAreDeclared) {
 }
 
 TEST_F(TraversalTest, TakesTurnsWithKernels) {
-    // Both have push constants of their own and share the buffer.
+    // Each has push constants of its own, the same every time, in the same place of the command buffer.
     const Kernel kernel = makeKernel(R"(
 layout(local_size_x = 4) in;
 layout(binding = 0, std430) buffer Results { uint results[]; };
@@ -274,12 +274,14 @@ void main() { results[gl_LaunchIDEXT.x] += amount; }
     compute([&](Compute& list) {
         list.setStorageBuffer(0, results);
         for (int turn = 0; turn < 2; turn++) {
-            list.setPushConstants(std::array<uint32_t, 2>{10, 2});
+            list.setPushConstants(10u);
             list.setKernel(kernel);
             list.dispatch(4);
+            list.setPushConstants(std::array<uint32_t, 2>{99, 2});
             list.setTraversal(traversal);
             list.dispatch(3);
         }
+        list.setPushConstants(10u);
         list.setKernel(kernel);
         list.dispatch(4);
     });

@@ -129,7 +129,7 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
     }
 
     const auto build = [&](std::span<TracingObject* const> objects) {
-        detail::forEachBatch(objects, memory->size, device.features().scratchAlignment,
+        detail::forEachBatch(objects, false, memory->size, device.features().scratchAlignment,
                              [&](std::span<TracingObject* const> batch, std::span<const uint64_t> offsets) {
                                  core->buildTracings(batch, offsets, *memory, false, where);
                              });

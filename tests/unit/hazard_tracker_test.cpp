@@ -238,7 +238,7 @@ TEST_F(HazardTrackerSoftware, RandomProgramsAreClean) {
     EXPECT_GT(beside, 1000u);
 }
 
-TEST_F(HazardTrackerSoftware, WhatIsLeftOutIsMissed) { runMutants(30); }
+TEST_F(HazardTrackerSoftware, WhatIsLeftOutIsMissed) { runMutants(60); }
 
 TEST_F(HazardTrackerSoftwareLong, RandomProgramsAreClean) { runPrograms(20000); }
 

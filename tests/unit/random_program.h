@@ -68,6 +68,20 @@ void main() {
     to[gl_GlobalInvocationID.x] = rayQueryProceedEXT(query) ? 1u : 0u;
 })";
 
+inline constexpr const char* trace_generation = R"(
+layout(binding = 0) uniform accelerationStructureEXT scene;
+layout(binding = 1) buffer To { uint to[]; };
+layout(location = 0) rayPayloadEXT uint payload;
+void main() {
+    traceRayEXT(scene, 0u, 0xffu, 0, 0, 0, vec3(0.0), 0.0, vec3(1.0), 1.0, 0);
+    to[gl_LaunchIDEXT.x] = payload;
+})";
+
+inline constexpr const char* reading_closest = R"(
+layout(binding = 2) readonly buffer From { uint from[]; };
+layout(location = 0) rayPayloadInEXT uint payload;
+void main() { payload = from[gl_PrimitiveID]; })";
+
 inline constexpr const char* plain_vertex = R"(
 layout(location = 0) in vec4 position;
 void main() { gl_Position = position; })";
@@ -136,6 +150,10 @@ struct Programs {
         gather = kernel(gather_kernel);
         address = kernel(address_kernel);
         trace = kernel(trace_kernel);
+        rays = device.createTraversal();
+        rays.createShaderGLSL(Shader::TypeRayGen, trace_generation);
+        rays.createShaderGLSL(Shader::TypeClosest, reading_closest);
+        EXPECT_THAT(rays.create(), IsOk());
         sampler = device.createSampler();
         const std::pair<const char*, const char*> stages[] = {
             {plain_vertex, plain_fragment},       {plain_vertex, sampling_fragment},
@@ -169,6 +187,7 @@ struct Programs {
         bool fetches, samples, paints;
     };
     Kernel copy, change, sample, store, paint, gather, address, trace;
+    Traversal rays;
     Sampler sampler;
     std::vector<DrawProgram> draws;  ///< each without and with depth
 };
@@ -361,7 +380,7 @@ private:
     }
 
     void dispatch(Compute& list) {
-        switch (below(8)) {
+        switch (below(9)) {
             case 0:
                 list.setKernel(programs_.gather);
                 list.setUniformBuffer(0, buffer(), 256 * below(3), 64);
@@ -405,6 +424,12 @@ private:
                 list.useBuffer(to, true);
                 break;
             }
+            case 7:
+                list.setTraversal(programs_.rays);
+                list.setTracing(0, top_);
+                list.setStorageBuffer(0, buffer());
+                list.setStorageBuffer(1, buffer());
+                break;
             default:
                 list.setKernel(programs_.trace);
                 list.setTracing(0, top_);

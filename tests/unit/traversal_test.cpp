@@ -3,11 +3,13 @@
 
 #include "support/matchers.h"
 
+#include <glint/device/detail/object.h>
 #include <glint/device/device.h>
 #include <platform/null/null_control.h>
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <memory>
 #include <vector>
@@ -15,6 +17,7 @@
 namespace glint::test {
 namespace {
 
+using null::HazardChecker;
 using null::NullControl;
 
 class TraversalOnNull : public testing::TestWithParam<TracingEngine> {
@@ -176,6 +179,49 @@ TEST_P(TraversalOnNull, CompactedStructuresAreTraced) {
                   trace(list, top, buffers[0], buffers[1]);
               }),
               1u);
+}
+
+TEST_P(TraversalOnNull, BuildsSideBySideHaveScratchMemoryOfTheirOwn) {
+    uint64_t largest = 0;
+    control->setObserver([&](const detail::Submission& submission, const HazardChecker&) {
+        for (const detail::ResolvedList& resolved : submission.lists)
+            detail::forEachCommand(*resolved.list, [&](uint32_t, const detail::CommandHeader& header) {
+                if (header.type != detail::CommandType::BuildTracings) return;
+                const auto& command = reinterpret_cast<const detail::BuildTracingsCommand&>(header);
+                const auto* builds = resolved.list->at<detail::TracingBuild>(command.builds);
+                uint64_t end = 0;
+                for (uint32_t i = 0; i < command.count; i++) {
+                    const auto& object =
+                        *static_cast<const detail::TracingObject*>(resolved.list->resources[builds[i].tracing]);
+                    const detail::NativeTracing& native = *object.nativeTracing();
+                    EXPECT_GE(builds[i].scratch_offset, end);
+                    end = builds[i].scratch_offset + (builds[i].update ? native.update_size : native.build_size);
+                }
+                largest = std::max<uint64_t>(largest, command.count);
+            });
+    });
+    std::vector<Tracing> all;
+    std::vector<Tracing::Instance> instances;
+    all.reserve(8);
+    for (int i = 0; i < 8; i++) {
+        all.push_back(device.createTracing("bottom"));
+        all.back().addVertexBuffer(3, FormatRGBf32, 12, vertices);
+        const Tracing::Flags compact = i % 2 ? Tracing::FlagCompact : Tracing::FlagNone;
+        ASSERT_THAT(all.back().create(Tracing::TypeTriangle, Tracing::FlagUpdate | compact), IsOk());
+        instances.push_back({.tracing = &all.back()});
+    }
+    ASSERT_THAT(device.buildTracings(all, Buffer(), Tracing::FlagCompact), IsOk());
+    EXPECT_EQ(largest, 8u);
+    const Tracing top = device.createTracing(instances);
+    // Compacted structures have no size of a build any more, only that of an update.
+    largest = 0;
+    barriers([&](Compute& list) {
+        for (const Tracing& bottom : all) list.updateTracing(bottom);
+        list.buildTracing(top);
+        trace(list, top, buffers[0], buffers[1]);
+    });
+    if (GetParam() == TracingEngine::Software) { EXPECT_EQ(largest, 8u); }
+    control->setObserver({});
 }
 
 INSTANTIATE_TEST_SUITE_P(Engines, TraversalOnNull, testing::Values(TracingEngine::Driver, TracingEngine::Software),

@@ -29,15 +29,17 @@ inline uint64_t reasonableScratch(uint64_t largest, uint64_t total) {
     return std::max(largest, std::min(total, reasonable));
 }
 
-/// Calls build(tracings, offsets) for as many builds at a time as find room in `size` bytes of scratch memory, which
-/// are enough for each of them.
+/// Calls build(tracings, offsets) for as many builds, or updates, at a time as find room in `size` bytes of scratch
+/// memory, which are enough for each of them.
 template <class Build>
-void forEachBatch(std::span<TracingObject* const> tracings, uint64_t size, uint64_t alignment, Build&& build) {
+void forEachBatch(std::span<TracingObject* const> tracings, bool update, uint64_t size, uint64_t alignment,
+                  Build&& build) {
     std::vector<uint64_t> offsets;
     uint64_t offset = 0;
     size_t first = 0;
     for (size_t i = 0; i < tracings.size(); i++) {
-        const uint64_t needed = tracings[i]->nativeTracing()->build_size;
+        const NativeTracing& native = *tracings[i]->nativeTracing();
+        const uint64_t needed = update ? native.update_size : native.build_size;
         if (offset + needed > size) {
             if (i > first) build(tracings.subspan(first, i - first), std::span<const uint64_t>(offsets));
             offsets.clear();

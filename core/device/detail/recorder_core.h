@@ -35,7 +35,7 @@ public:
     Queue queue() const { return queue_; }
     const CommandList& list() const { return list_; }
     const Error& error() const { return list_.error; }
-    bool isEmpty() const { return list_.command_count == 0 && pending_.isEmpty(); }
+    bool isEmpty() const { return list_.command_count == 0 && !hasPending(); }
     Status end(Where where);
 
     bool submitted = false;
@@ -199,7 +199,7 @@ private:
     }
     /// The accesses added from here on belong to the next push(), which comes after the builds that are pending.
     void beginAccesses() {
-        if (!pending_.isEmpty()) playPending();
+        if (hasPending()) playPending();
         first_access_ = static_cast<uint32_t>(list_.accesses.size());
     }
     void access(uint32_t resource, Stage stage, uint8_t flags) {
@@ -212,6 +212,7 @@ private:
     void writeInstances(TracingObject& tracing);
     void buildByDriver(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                        BufferObject& scratch, bool update, Where where);
+    void playDriverBuilds();
     bool setDriverInstances(const TracingObject& from, TracingObject& twin);
     void buildInSoftware(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                          BufferObject& scratch, bool update, Where where);
@@ -221,6 +222,7 @@ private:
     bool writeDeviceInstances(TracingObject& tracing, PendingBuilds::Copy& copy, Where where);
     bool preparePass(const BuildPass& pass, TracingObject& tracing, const PendingBuilds::Scratch& scratch, Where where);
     void playPending();
+    void playSoftwareBuilds();
     /// Of the accesses that were begun.
     void copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size);
     void traceRays(uint64_t width, uint64_t height, uint64_t depth, Where where);
@@ -287,7 +289,16 @@ private:
 
     std::vector<Placement> placements_;
     std::vector<TracingHeap::Range> moves_;
+    /// A structure that the driver builds beside the software engine, after what is pending there.
+    struct DriverBuild {
+        TracingObject* tracing = nullptr;  ///< the list keeps it alive
+        bool update = false;
+        Where where;
+    };
+    bool hasPending() const { return !pending_.isEmpty() || !driver_builds_.empty(); }
+
     PendingBuilds pending_;
+    std::vector<DriverBuild> driver_builds_;
     uint64_t shared_scratch_ = 0;  ///< bytes of the device's scratch memory that pending builds use
     uint32_t heap_block_ = none;   ///< inline data: the heap's address
 

@@ -181,29 +181,44 @@ void RecorderCore::buildByDriver(std::span<TracingObject* const> tracings, std::
 
 void RecorderCore::buildForTraversals(std::span<TracingObject* const> tracings, bool update, Where where) {
     if (!device_->buildsForTraversals()) return;
-    std::vector<TracingObject*> builds, refits;
-    uint64_t largest = 0;
-    uint64_t total = 0;
     for (TracingObject* tracing : tracings) {
+        if (!recording(where)) return;
         const Expected<TracingObject*> made = driverTracing(*tracing, where);
         if (!made) return fail(made.error());
         TracingObject& twin = **made;
+        const bool is_top = tracing->tracing_type == Tracing::TypeInstance;
+        // Those of one level that differ may run side by side.
+        const bool fits = std::ranges::none_of(driver_builds_, [&](const DriverBuild& pending) {
+            return pending.tracing == &twin || (pending.tracing->tracing_type == Tracing::TypeInstance) != is_top;
+        });
+        if (!fits) playPending();
         if (!setDriverInstances(*tracing, twin)) continue;
+        use(twin);
         // A top level may have other instances than it was built from.
-        const bool refit = update && twin.built && tracing->tracing_type != Tracing::TypeInstance;
-        (refit ? refits : builds).push_back(&twin);
-        const NativeTracing& native = *twin.nativeTracing();
-        const uint64_t size = std::max(refit ? native.update_size : native.build_size, uint64_t(1));
+        driver_builds_.push_back({&twin, update && twin.built && !is_top, where});
+        confirmBuild(twin);
+    }
+}
+
+void RecorderCore::playDriverBuilds() {
+    const Where where = driver_builds_.back().where;
+    std::vector<TracingObject*> parts[2];
+    uint64_t largest = 1;
+    uint64_t total = 0;
+    for (const DriverBuild& pending : driver_builds_) {
+        parts[pending.update].push_back(pending.tracing);
+        const NativeTracing& native = *pending.tracing->nativeTracing();
+        const uint64_t size = pending.update ? native.update_size : native.build_size;
         largest = std::max(largest, size);
         total += size;
     }
-    if (!recording(where) || largest == 0) return;
+    driver_builds_.clear();
     const Expected<Ref<BufferObject>> scratch = device_->acquireScratch(reasonableScratch(largest, total), where);
     if (!scratch) return fail(scratch.error());
-    for (const bool update_batch : {false, true})
-        forEachBatch(update_batch ? refits : builds, (*scratch)->size, device_->features().scratchAlignment,
+    for (const bool update : {false, true})
+        forEachBatch(parts[update], update, (*scratch)->size, device_->features().scratchAlignment,
                      [&](std::span<TracingObject* const> batch, std::span<const uint64_t> offsets) {
-                         buildByDriver(batch, offsets, **scratch, update_batch, where);
+                         buildByDriver(batch, offsets, **scratch, update, where);
                      });
 }
 

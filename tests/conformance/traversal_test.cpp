@@ -289,6 +289,26 @@ void main() { results[gl_LaunchIDEXT.x] += amount; }
     EXPECT_EQ(read<uint32_t>(results), (Words{1220, 1220, 1220, 1000}));
 }
 
+TEST_F(TraversalTest, TakesSpirv) {
+    const TempDir folder;
+    const std::string file = (folder / "trace.spv").string();
+    const Shader shader = Shader::createGLSL(Shader::TypeRayGen, write_index);
+    ASSERT_TRUE(shader) << shader.error().text();
+    const auto words = std::as_bytes(shader.getWords());
+    ASSERT_THAT(writeTextFile(file, {reinterpret_cast<const char*>(words.data()), words.size()}), IsOk());
+    Traversal traversal = device.createTraversal("traversal");
+    EXPECT_TRUE(traversal.loadShaderSPIRV(Shader::TypeRayGen, file));
+    traversal.setShader(Shader::createSPIRV(Shader::TypeRayGen, shader.getWords()));
+    ASSERT_THAT(traversal.create(), IsOk());
+    EXPECT_EQ(traversal.getGenerations(), 2u);
+    EXPECT_EQ(trace(traversal, 3,
+                    [&](Compute& list) {
+                        list.setTraversal(traversal, 1);
+                        list.dispatch(2);
+                    }),
+              (Words{0, 1, 0xdead}));
+}
+
 TEST_F(TraversalTest, IsCreatedInTheBackground) {
     Traversal traversal = device.createTraversal("traversal");
     traversal.createShaderGLSL(Shader::TypeRayGen, write_index);

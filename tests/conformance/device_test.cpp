@@ -140,10 +140,20 @@ TEST_P(DeviceTests, NullDeviceIsHarmless) {
     pipeline.setColorFormat(FormatRGBAu8n);
     pipeline.addAttribute(Pipeline::AttributePosition, FormatRGBf32, 0, 0, 12);
     EXPECT_THAT(pipeline.create(), HasErrorId("handle.null"));
+    for (Traversal traversal : {nobody.createTraversal(), Traversal()}) {
+        EXPECT_FALSE(traversal.createShaderGLSL(Shader::TypeRayGen, "void main() {}"));
+        traversal.addHitGroup().setRecursionDepth(2);
+        traversal.setTracingMask(0, Shader::MaskTracing);
+        EXPECT_EQ(traversal.addHitRecord(0, 1u), 0u);
+        EXPECT_EQ(traversal.getHitRecords(), 0u);
+        EXPECT_EQ(traversal.getHitGroups(), 0u);
+        EXPECT_THAT(traversal.create(), HasErrorId("handle.null"));
+    }
     Tracing tracing = nobody.createTracing();
     EXPECT_THAT(tracing.create(Tracing::TypeInstance), HasErrorId("handle.null"));
     Compute compute = nobody.createCompute();
     compute.setKernel(kernel);
+    compute.setTraversal(Traversal());
     compute.setUniform(0, 1);
     compute.setStorageBuffers(0, {Buffer(), Buffer()});
     compute.dispatch(1);

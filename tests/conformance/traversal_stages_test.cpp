@@ -123,8 +123,8 @@ TEST_F(TraversalStages, AnyHitTerminates) {
     // The first one that is accepted ends the ray without the shader's asking, too.
     const Traversal plain = counting("");
     EXPECT_EQ(lookDown(plain, scene, 1, {.flags = RayFirst}), (Words{7 + 1 + 100}));
-    // All are ignored, so all of them are seen.
-    EXPECT_EQ(lookDown(counting("ignoreIntersectionEXT;"), scene, 1), (Words{7 + 8 + 50}));
+    // All are ignored, so all of them are seen; a driver may ask more than once about one.
+    EXPECT_GE(lookDown(counting("ignoreIntersectionEXT;"), scene, 1)[0], 7u + 8u + 50u);
 }
 
 TEST_F(TraversalStages, ShadowRays) {

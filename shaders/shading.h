@@ -30,3 +30,15 @@ vec3 glintEncodeSrgb(vec3 linear) {
     const vec3 value = clamp(linear, 0.0, 1.0);
     return mix(1.055 * pow(value, vec3(1.0 / 2.4)) - 0.055, 12.92 * value, lessThanEqual(value, vec3(0.0031308)));
 }
+
+// The share of unpolarised light that the surface of a dielectric mirrors (Fresnel's equations). `cosine`: of the angle
+// to the normal, in [0, 1]; `eta`: the index on the ray's side over the one beyond, as for refract(). 1 where nothing
+// is refracted.
+float glintFresnel(float cosine, float eta) {
+    const float square = 1.0 - eta * eta * (1.0 - cosine * cosine);
+    if (square <= 0.0) return 1.0;
+    const float beyond = sqrt(square);
+    const float across = (eta * cosine - beyond) / (eta * cosine + beyond);
+    const float along = (cosine - eta * beyond) / (cosine + eta * beyond);
+    return 0.5 * (across * across + along * along);
+}

@@ -7,7 +7,8 @@
 // Where a direction of any length is on the picture, from (0, 0) at its top left to (1, 1). The edge of the picture is
 // -X. Off by 2^-12 where arcs of tangents have the worst error that Vulkan allows them.
 vec2 glintLatitudeLongitude(vec3 direction) {
-    return vec2(0.5 - atan(direction.y, direction.x) * (0.5 * GLINT_INVERSE_PI),
+    const bool is_pole = direction.xy == vec2(0.0);  // where GLSL leaves the arc open
+    return vec2(0.5 - (is_pole ? 0.0 : atan(direction.y, direction.x)) * (0.5 * GLINT_INVERSE_PI),
                 0.5 - atan(direction.z, length(direction.xy)) * GLINT_INVERSE_PI);
 }
 

@@ -33,10 +33,10 @@ vec3 glintEncodeSrgb(vec3 linear) {
 
 // The share of unpolarised light that the surface of a dielectric mirrors (Fresnel's equations). `cosine`: of the angle
 // to the normal, in [0, 1]; `eta`: the index on the ray's side over the one beyond, as for refract(). 1 where nothing
-// is refracted.
+// is refracted, and along the surface.
 float glintFresnel(float cosine, float eta) {
     const float square = 1.0 - eta * eta * (1.0 - cosine * cosine);
-    if (square <= 0.0) return 1.0;
+    if (square <= 0.0 || cosine <= 0.0) return 1.0;
     const float beyond = sqrt(square);
     const float across = (eta * cosine - beyond) / (eta * cosine + beyond);
     const float along = (cosine - eta * beyond) / (cosine + eta * beyond);

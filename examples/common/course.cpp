@@ -43,7 +43,7 @@ Camera CourseStage::camera(float time, float aspect) {
     return Camera().lookAt(from, target()).perspective(40.0f, aspect);
 }
 
-CourseBuffers::CourseBuffers(Device& device, const CourseStage& stage) {
+CourseBuffers::CourseBuffers(Device& device, const CourseStage& stage, const Arrange& arrange) {
     std::vector<Vector3f> vertices;
     std::vector<uint32_t> indices;
     std::vector<Tracing::Instance> instances(CourseStage::object_count);
@@ -71,6 +71,12 @@ CourseBuffers::CourseBuffers(Device& device, const CourseStage& stage) {
                             Tracing::FlagFastTrace);  // carried by the handle
     }
     for (uint32_t i = 0; i < instances.size(); i++) instances[i].tracing = &objects_[i];
+    if (arrange) {
+        if (Status status = arrange(device, instances); !status) {
+            error_ = status.error();
+            return;
+        }
+    }
     scene_ = device.createTracing(instances, Tracing::FlagFastTrace, "scene");
     if (Status status = device.buildTracings({objects_[0], objects_[1], scene_}); !status) error_ = status.error();
 }
@@ -97,8 +103,9 @@ Course::Course(Example& example, std::string shader) : example_(example), shader
 
 int Course::run(uint32_t recursion, const std::function<void(Traversal&)>& load,
                 const std::function<void(Compute&)>& bind) {
-    const Expected<CourseStage> stage = CourseStage::load(mesh_);
+    Expected<CourseStage> stage = CourseStage::load(mesh_);
     if (!stage) return report(stage.error());
+    stage_ = std::move(*stage);
     Device device = openDevice(example_, FeatureComputeTracing);
     if (!device) return report(device.error());
     use_query_ = use_query_ || needsQueries(example_, device, recursion);
@@ -117,7 +124,7 @@ int Course::run(uint32_t recursion, const std::function<void(Traversal&)>& load,
         traversal.setRecursionDepth(recursion);
         if (!traversal.create()) return report(traversal.error());
     }
-    const CourseBuffers buffers(device, *stage);
+    const CourseBuffers buffers(device, stage_, arrange_);
     if (buffers.error()) return report(buffers.error());
 
     Viewer viewer(example_, device);

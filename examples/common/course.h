@@ -65,8 +65,11 @@ private:
 /// structure for each object, and one of an instance of each.
 class CourseBuffers {
 public:
+    /// Takes the instances of mesh and floor, which it may change and add to, and has what it adds built on the device.
+    using Arrange = std::function<glint::Status(glint::Device&, std::vector<glint::Tracing::Instance>&)>;
+
     /// Makes and builds everything; check error().
-    CourseBuffers(glint::Device& device, const CourseStage& stage);
+    CourseBuffers(glint::Device& device, const CourseStage& stage, const Arrange& arrange = {});
     const glint::Error& error() const { return error_; }
 
     /// Binds what course.shader declares in set 0.
@@ -91,6 +94,10 @@ public:
     Course(Example& example, std::string shader);
 
     const std::string& shader() const { return shader_; }
+    /// To be told before run(): what else stands on the stage, and whatever the example needs on the device.
+    void setArrange(CourseBuffers::Arrange arrange) { arrange_ = std::move(arrange); }
+    /// What run() shows.
+    const CourseStage& stage() const { return stage_; }
 
     /// Opens the device, makes stage and program, draws, writes what was asked
     /// for: the exit code. `load` loads the shaders of the pipeline, whose traces
@@ -104,5 +111,7 @@ private:
     Example& example_;
     std::string shader_;
     std::filesystem::path mesh_;
+    CourseBuffers::Arrange arrange_;
+    CourseStage stage_;
     bool use_query_ = false;
 };

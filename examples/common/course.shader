@@ -77,14 +77,16 @@ vec3 toLight(Surface surface, out float arriving) {
 const float ambient = 0.12;
 
 /// Phong's model: what the surroundings send, and what the lamp does if nothing is in the way. `visible` is 0 or 1.
-vec3 phong(Surface surface, vec3 direction, float visible, float specular, float shininess) {
+vec3 phong(Surface surface, vec3 color, vec3 direction, float visible, float specular, float shininess) {
     float arriving;
     const vec3 to_light = toLight(surface, arriving);
-    const vec3 color = surfaceColor(surface);
     const float diffuse = glintDiffuse(surface.normal, to_light);
     const float highlight =
         diffuse > 0.0 ? specular * glintPhong(surface.normal, to_light, direction, shininess) : 0.0;
     return color * ambient + (color * diffuse + highlight) * (arriving * visible);
+}
+vec3 phong(Surface surface, vec3 direction, float visible, float specular, float shininess) {
+    return phong(surface, surfaceColor(surface), direction, visible, specular, shininess);
 }
 
 /// False where no light can arrive, whatever is in the way: the triangle, or its interpolated normal, is turned away.
@@ -119,12 +121,9 @@ void storePixel(vec3 color) { imageStore(picture, ivec2(PIXEL), vec4(color, 1.0)
 /// Whole groups of threads are started.
 bool isOutside() { return any(greaterThanEqual(PIXEL, uvec2(imageSize(picture)))); }
 
-/// False if the ray meets nothing.
-bool closestSurface(vec3 origin, vec3 direction, out Surface surface) {
-    rayQueryEXT query;
-    rayQueryInitializeEXT(query, scene, gl_RayFlagsOpaqueEXT, 0xff, origin, 0.0, direction, far);
-    while (rayQueryProceedEXT(query)) {}
-    if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT) return false;
+/// What a query has found; false if it has found no triangle.
+bool committedSurface(rayQueryEXT query, vec3 direction, out Surface surface) {
+    if (rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionTriangleEXT) return false;
     surface = surfaceAt(uint(rayQueryGetIntersectionInstanceIdEXT(query, true)),
                         uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true)),
                         uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true)),
@@ -132,6 +131,14 @@ bool closestSurface(vec3 origin, vec3 direction, out Surface surface) {
                         rayQueryGetIntersectionObjectToWorldEXT(query, true),
                         rayQueryGetIntersectionWorldToObjectEXT(query, true), direction);
     return true;
+}
+
+/// False if the ray meets nothing.
+bool closestSurface(vec3 origin, vec3 direction, out Surface surface) {
+    rayQueryEXT query;
+    rayQueryInitializeEXT(query, scene, gl_RayFlagsOpaqueEXT, 0xff, origin, 0.0, direction, far);
+    while (rayQueryProceedEXT(query)) {}
+    return committedSurface(query, direction, surface);
 }
 
 /// 1 where the lamp is seen from, else 0: any hit on the way there is enough.

@@ -36,7 +36,7 @@ inline glint::Expected<glint::Image> createSky(uint32_t width, uint32_t height) 
 inline glint::Expected<glint::Image> loadEnvironment(std::filesystem::path path) {
     using namespace glint;
     if (path.empty()) {
-        path = "/usr/share/blender/datafiles/studiolights/world/courtyard.exr";
+        path = "/usr/share/blender/datafiles/studiolights/world/forest.exr";
         std::error_code none;
         if (!std::filesystem::exists(path, none)) path = "sky";
     }

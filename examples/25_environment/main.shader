@@ -29,11 +29,11 @@ vec3 gathered(vec3 direction) {
     return surroundings(direction, clamp(0.5 * log2(size.x * size.y / float(samples)) - 2.0, 0.0, log2(size.y) - 2.0));
 }
 
-/// Directions about the normal, more of them where they count more: by the cosine. One in each ring of equal share.
+/// Directions about the normal, more of them where they count more: by the cosine. One in each ring of equal share, and
+/// each turned against the one before by the golden section, which leaves no large gaps.
 vec3 gatherDirection(vec3 normal, uint sample_number, uint seed) {
-    const uint hash = glintHash(seed, sample_number);
-    const float square = (float(sample_number) + glintUniform(hash)) / float(samples);
-    const float turn = GLINT_TWO_PI * glintUniform(glintHash(hash));
+    const float square = (float(sample_number) + glintUniform(glintHash(seed, sample_number))) / float(samples);
+    const float turn = GLINT_TWO_PI * fract(glintUniform(seed) + float(sample_number) * (GLINT_GOLDEN_RATIO - 1.0));
     const vec3 side = normalize(cross(normal, abs(normal.z) < 0.9 ? vec3(0, 0, 1) : vec3(1, 0, 0)));
     return sqrt(square) * (cos(turn) * side + sin(turn) * cross(normal, side)) + sqrt(1.0 - square) * normal;
 }

@@ -1,9 +1,6 @@
 // Glass bodies that are given by planes: boxes, and an intersection shader that says where a ray meets what is in them.
 
 #include "26_procedural/hull.h"
-#include "common/course.h"
-
-#include <glint/geometry/primitives.h>
 
 #include <algorithm>
 
@@ -20,35 +17,6 @@ struct Settings {
 struct Range {
     uint32_t first, count;
 };
-
-/// The mesh's hull about the mesh, which floats in it at half its size, and two crystals beside it; all in the world.
-std::vector<Hull> createHulls(const CourseStage& stage) {
-    std::vector<Vector3f> points;
-    for (const Vector3f& position : stage.mesh(CourseStage::object_mesh).positions)
-        points.push_back(transformPoint(stage.transform(CourseStage::object_mesh).matrix(), position) +
-                         Vector3f(0, 0, 0.05f));
-    const std::vector<Vector3f> directions = createSphere(1.0f, 1).positions;
-    std::vector<Hull> hulls = {hullOf(points, directions)};
-
-    const auto addCrystal = [&](const Vector3f& bottom, float radius, float height, int sides) {
-        std::vector<Vector3f> corners = {bottom + Vector3f(0, 0, height)};
-        std::vector<Vector3f> normals;
-        for (int i = 0; i < sides; i++) {
-            const float turn = 2.0f * pi * static_cast<float>(i) / static_cast<float>(sides);
-            const Vector3f out(std::cos(turn), std::sin(turn), 0.0f);
-            corners.push_back(bottom + radius * out);
-            corners.push_back(bottom + radius * out + Vector3f(0, 0, 0.6f * height));
-            const Vector3f across(std::cos(turn + pi / static_cast<float>(sides)),
-                                  std::sin(turn + pi / static_cast<float>(sides)), 0.0f);
-            normals.push_back(across);
-            normals.push_back(glm::normalize(across * 0.4f * height + Vector3f(0, 0, radius)));
-        }
-        hulls.push_back(hullOf(corners, normals));
-    };
-    addCrystal({0.9f, 2.5f, 0.02f}, 0.5f, 1.5f, 6);
-    addCrystal({1.3f, -2.1f, 0.02f}, 0.45f, 0.9f, 5);
-    return hulls;
-}
 
 }  // namespace
 
@@ -90,9 +58,7 @@ int main(int argc, char** argv) {
 
         // The mesh at half its size, in the middle of its hull. Rays in glass look at front faces of triangles as well.
         Tracing::Instance& mesh = instances[CourseStage::object_mesh];
-        const Vector3f center = boxes[0].center();
-        const Transform3x4 half(translate(center) * scale(Vector3f(0.5f)) * translate(-center) *
-                                course.stage().transform(CourseStage::object_mesh).matrix());
+        const Transform3x4 half = floatingMesh(course.stage(), boxes[0].center());
         std::copy(half.rows.begin(), half.rows.end(), mesh.transform);
         for (Tracing::Instance& instance : instances) instance.flags = Tracing::InstanceCullDisable;
         // No part of shadows: its mask.

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 
 using namespace glint;
 
@@ -70,9 +71,10 @@ int main(int argc, char** argv) {
     if (!example.parse(argc, argv)) return example.exitCode();
     const std::array<std::string, 3> lenses = {"pinhole", "fisheye", "spherical"};
     const auto found = std::find(lenses.begin(), lenses.end(), lens);
-    if (found == lenses.end())
-        return report(Error(ErrorCode::InvalidArgument, "example.lens",
-                            "--lens is '" + lens + "'; there are pinhole, fisheye and spherical"));
+    if (found == lenses.end()) {
+        std::fprintf(stderr, "--lens: '%s' is none of pinhole, fisheye, spherical\n", lens.c_str());
+        return 2;
+    }
     const auto number = static_cast<uint32_t>(found - lenses.begin());
 
     const auto load = [&](Traversal& traversal) {

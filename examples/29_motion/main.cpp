@@ -131,11 +131,7 @@ int main(int argc, char** argv) {
     if (!stage) return report(stage.error());
     Device device = openDevice(example, FeatureComputeTracing);
     if (!device) return report(device.error());
-    if (!use_query && !device.getFeatures().rayTracing) {
-        std::fprintf(stderr, "%s: ray queries: '%s' has no ray-tracing pipelines\n", example.name().c_str(),
-                     device.getInfo().name.c_str());
-        use_query = true;
-    }
+    use_query = use_query || needsQueries(example, device, 1);
     const char* shader = EXAMPLE_DIR "/main.shader";
     Kernel morph = device.createKernel("morph"), kernel;
     morph.loadShaderGLSL(shader, "MORPH_SHADER=1");

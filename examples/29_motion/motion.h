@@ -23,21 +23,18 @@ struct Motion {
     /// whose length does not count) and translation are interpolated one by one, and what turns keeps its size.
     glint::Transform3x4 transform(Body body, float moment) const {
         using namespace glint;
-        Matrix4x4f pose = placeOf(body);
+        Matrix4x4f pose = scale(Vector3f(size));
         if (body == MatrixKeys) {
             const Matrix4x4f first = keys_[0].matrix(), second = keys_[1].matrix();
             for (int i = 0; i < 4; i++) pose[i] = glm::mix(first[i], second[i], moment);
-            pose = placeOf(body) * pose;
         } else if (body == TransformKeys) {
             SceneTransform key;
             key.translation = glm::mix(keys_[0].translation, keys_[1].translation, moment);
             key.rotation = glm::mix(keys_[0].rotation, keys_[1].rotation, moment);
             key.scale = glm::mix(keys_[0].scale, keys_[1].scale, moment);
-            pose = pose * key.matrix();
-        } else {
-            pose = pose * scale(Vector3f(size));
+            pose = key.matrix();
         }
-        return Transform3x4(pose * rest_);
+        return Transform3x4(placeOf(body) * pose * rest_);
     }
 
     /// How much of the target there is in the third body's corners.

@@ -32,8 +32,9 @@ struct InstanceGroup {
     std::string name;  ///< for messages
     std::vector<Entry> entries;
 
+    /// Adds an instance.
     void add(const Tracing::Instance& instance) { entries.push_back({instance, none}); }
-    /// `transform`: of the group to this one.
+    /// Adds a group. `transform`: from there to this one; `offset`: for all instances in it.
     void add(uint32_t group, const Transform3x4& transform, uint32_t offset = 0);
 };
 

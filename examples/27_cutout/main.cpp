@@ -1,5 +1,6 @@
 // Holes that the triangles know nothing of: an any-hit shader refuses hits where a texture has none of the mesh.
 
+#include "27_cutout/holes.h"
 #include "common/course.h"
 
 #include <algorithm>
@@ -14,22 +15,6 @@ struct Settings {
     uint32_t is_stochastic = 0;
     uint32_t samples = 1;
 };
-
-/// How much of the mesh there is: round holes with soft borders, in rows that are half a step apart.
-Expected<Image> createHoles() {
-    constexpr uint32_t size = 256;
-    Expected<Image> image = Image::create(FormatRu8n, size, size);
-    if (!image) return image;
-    for (uint32_t y = 0; y < size; y++)
-        for (uint32_t x = 0; x < size; x++) {
-            const Vector2f place = (Vector2f(x, y) + 0.5f) / static_cast<float>(size);
-            float distance = 1.0f;  // to the nearest of the corners' holes and the centre's
-            for (const Vector2f hole : {Vector2f(0.5f), Vector2f(0, 0), Vector2f(1, 0), Vector2f(0, 1), Vector2f(1, 1)})
-                distance = std::min(distance, glm::length(place - hole));
-            image->store(x, y, Vector4f(std::clamp((distance - 0.18f) / 0.14f, 0.0f, 1.0f)));
-        }
-    return image;
-}
 
 }  // namespace
 

@@ -2,6 +2,7 @@
 // closed form, surroundings and motion, against float64.
 
 #include "25_environment/environment.h"
+#include "27_cutout/holes.h"
 #include "29_motion/motion.h"
 #include "golden/render.h"
 #include "support/course_reference.h"
@@ -144,6 +145,73 @@ TEST(CourseSurroundings, AreThoseOfThePicture) {
         }
     std::printf("%u pixels of surroundings, off by at most %.2f steps\n", compared, largest * 255.0);
     EXPECT_GT(compared, width * height / 10);
+}
+
+namespace {
+
+double linear(float stored) {
+    const auto value = static_cast<double>(stored);
+    return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
+}  // namespace
+
+// An upright square: where the camera's ray meets it, and what the texture has there, in float64. Where that is half
+// within what a filter's weights of 1/256 make of its slope, 1/36 a texel, either is right. Random hits have their
+// probability as mean: five standard deviations of 256 samples, and a step of 8 bits.
+TEST(CourseCutout, HasItsHolesWhereTheTextureHas) {
+    constexpr uint32_t width = 96, height = 54, samples = 256;
+    constexpr double opacity = 0.6;
+    const TempDir folder;
+    const std::filesystem::path file = folder / "square.ply";
+    ASSERT_TRUE(createPlane(2.0f).save(file));
+    const Expected<CourseStage> stage = CourseStage::load(file);
+    const Expected<Image> holes = createHoles();
+    ASSERT_TRUE(stage && holes);
+    const std::string arguments = "--size 96x54 --query --mesh '" + file.string() + "'";
+    const Expected<Image> cut = renderExample("27_cutout", arguments, folder);
+    const Expected<Image> absent = renderExample("27_cutout", arguments + " --opacity 0", folder);
+    const Expected<Image> mixed =
+        renderExample("27_cutout", arguments + " --stochastic --opacity 0.6 --samples 256", folder);
+    ASSERT_TRUE(cut && absent && mixed);
+
+    const Eye eye(0.0f, width, height);
+    const Matrix4x4d to_object = glm::inverse(Matrix4x4d(stage->transform(CourseStage::object_mesh).matrix()));
+    const Vector3d origin(to_object * Vector4d(eye.origin(), 1.0));
+    const auto texel = [&](double x, double y) {
+        const auto wrap = [](double i) { return static_cast<uint32_t>(i - 256.0 * std::floor(i / 256.0)); };
+        return static_cast<double>(holes->load(wrap(x), wrap(y)).x);
+    };
+    uint32_t there = 0, through = 0, random = 0;
+    for (uint32_t y = 0; y < height; y++)
+        for (uint32_t x = 0; x < width; x++) {
+            const Vector3d direction(to_object * Vector4d(eye.direction(x, y), 0.0));
+            const Vector3d place = origin - direction * (origin.z / direction.z);
+            if (std::max(std::abs(place.x), std::abs(place.y)) > 0.999) continue;
+            const Vector2d at = Vector2d(place) * 2.5 * 256.0 - 0.5, low = glm::floor(at), weight = at - low;
+            const double alpha =
+                glm::mix(glm::mix(texel(low.x, low.y), texel(low.x + 1, low.y), weight.x),
+                         glm::mix(texel(low.x, low.y + 1), texel(low.x + 1, low.y + 1), weight.x), weight.y);
+            const Vector4f seen = cut->load(x, y), behind = absent->load(x, y);
+            // The mesh is orange, the floor grey, the sky blue.
+            const bool is_there = seen.x - seen.z > 0.1f;
+            if (std::abs(alpha - 0.5) > 2.0 / 36.0 / 256.0 + 1e-3) {
+                EXPECT_EQ(is_there, alpha > 0.5) << x << ", " << y;
+            }
+            (is_there ? there : through)++;
+            // Before the sky, which no shadow falls on, and where the texture is full.
+            const bool is_sky = behind.z > behind.x + 0.03f;
+            if (!is_sky || alpha < 1.0 || !is_there) continue;
+            random++;
+            const double full = linear(seen.z), empty = linear(behind.z);
+            const double share = (linear(mixed->load(x, y).z) - empty) / (full - empty);
+            EXPECT_NEAR(share, opacity,
+                        5.0 * std::sqrt(opacity * (1.0 - opacity) / samples) + 0.01 / std::abs(full - empty));
+        }
+    std::printf("%u pixels are there, %u are holes; %u are there at random\n", there, through, random);
+    EXPECT_GT(there, 300u);
+    EXPECT_GT(through, 100u);
+    EXPECT_GT(random, 100u);
 }
 
 namespace {

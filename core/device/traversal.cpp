@@ -79,16 +79,34 @@ Error TraversalObject::checkRecords(const Stages& stages, Where where) const {
     return {};
 }
 
+/// False for a miss or callable shader that no call can reach: those with a constant name other records.
+bool TraversalObject::isCalled(const Stages& stages, uint32_t shader) const {
+    const RayTable table = tableOf(stages.shaders[shader]->source.stage);
+    if (table != RayTable::Miss && table != RayTable::Callable) return true;
+    const std::vector<Group>& all = groups[static_cast<size_t>(table)];
+    const std::vector<Record>& added = records[static_cast<size_t>(table)];
+    const auto reaches = [&](uint32_t record) {
+        if (record == RayCall::unknown) return true;
+        if (record >= countRecords(table)) return false;
+        return all[added.empty() ? record : added[record].group].general == shader;
+    };
+    return std::ranges::any_of(stages.shaders, [&](const Ref<ShaderObject>& caller) {
+        return std::ranges::any_of(caller->compiled.reflection.ray_calls, [&](const RayCall& call) {
+            return call.is_callable == (table == RayTable::Callable) && reaches(call.record);
+        });
+    });
+}
+
 Error TraversalObject::checkVariables(const Stages& stages, Where where) const {
     using Kind = RayVariable::Kind;
     const uint32_t limit = device()->features().maxAttributeSize;
     const auto forEach = [&](auto visit) {
-        for (const Ref<ShaderObject>& shader : stages.shaders)
-            for (const RayVariable& variable : shader->compiled.reflection.ray_variables)
-                visit(shader->source.stage, variable);
+        for (uint32_t i = 0; i < stages.shaders.size(); i++)
+            for (const RayVariable& variable : stages.shaders[i]->compiled.reflection.ray_variables)
+                visit(i, stages.shaders[i]->source.stage, variable);
     };
     Error error;
-    forEach([&](ShaderStage stage, const RayVariable& variable) {
+    forEach([&](uint32_t index, ShaderStage stage, const RayVariable& variable) {
         if (error) return;
         if (variable.kind == Kind::Attribute && variable.size > limit)
             error = problem(where, ErrorCode::OutOfRange, "traversal.attribute",
@@ -96,10 +114,11 @@ Error TraversalObject::checkVariables(const Stages& stages, Where where) const {
                                         variable.name, glint::toString(stage), variable.size, limit));
         const bool is_payload = variable.kind == Kind::IncomingPayload;
         if (!is_payload && variable.kind != Kind::IncomingCallable) return;
+        if (!isCalled(stages, index)) return;
         // Which caller it is, shaders decide as they run: there has to be one that fits.
         std::string others;
         bool fits = false;
-        forEach([&](ShaderStage caller, const RayVariable& sent) {
+        forEach([&](uint32_t, ShaderStage caller, const RayVariable& sent) {
             if (sent.kind != (is_payload ? Kind::Payload : Kind::Callable)) return;
             fits |= sent.size == variable.size;
             others += fmt::format("{}'{}' of the {} shader with {}", others.empty() ? "" : ", ", sent.name,

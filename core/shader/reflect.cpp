@@ -88,15 +88,29 @@ std::optional<RayVariable::Kind> rayKind(spv::StorageClass storage) {
 }
 
 /// Ids that instructions of functions name.
-std::vector<uint32_t> idsOfFunctions(std::span<const uint32_t> words) {
+std::vector<uint32_t> idsOfFunctions(const shader::SpirvModule& parts) {
     std::vector<uint32_t> ids;
-    const Expected<shader::SpirvModule> parts = shader::SpirvModule::parse(words);
-    if (!parts) return ids;
-    for (const shader::Instructions& function : parts->functions)
+    for (const shader::Instructions& function : parts.functions)
         for (const shader::Instruction& instruction : function)
             for (const uint16_t place : instruction.ids) ids.push_back(instruction.words[place]);
     std::sort(ids.begin(), ids.end());
     return ids;
+}
+
+std::vector<RayCall> callsOf(const shader::SpirvModule& parts) {
+    std::vector<RayCall> calls;
+    const auto add = [&](bool is_callable, uint32_t index) {
+        const auto constant = std::ranges::find_if(parts.globals, [&](const shader::Instruction& item) {
+            return item.opcode == spv::OpConstant && item.result() == index;
+        });
+        calls.push_back({is_callable, constant == parts.globals.end() ? RayCall::unknown : constant->operands()[0]});
+    };
+    for (const shader::Instructions& function : parts.functions)
+        for (const shader::Instruction& instruction : function) {
+            if (instruction.opcode == spv::OpTraceRayKHR) add(false, instruction.operands()[5]);
+            if (instruction.opcode == spv::OpExecuteCallableKHR) add(true, instruction.operands()[0]);
+        }
+    return calls;
 }
 
 bool hasRowMajor(const Module& module, const SPIRType& block) {
@@ -146,7 +160,10 @@ public:
     }
 
     void readRayVariables(std::span<const uint32_t> words) {
-        const std::vector<uint32_t> used = idsOfFunctions(words);
+        const Expected<shader::SpirvModule> parts = shader::SpirvModule::parse(words);
+        if (!parts) return;
+        reflection_.ray_calls = callsOf(*parts);
+        const std::vector<uint32_t> used = idsOfFunctions(*parts);
         module_.ir.for_each_typed_id<spirv_cross::SPIRVariable>(
             [&](uint32_t id, const spirv_cross::SPIRVariable& variable) {
                 const SPIRType& type = module_.get_type(variable.basetype);

@@ -115,6 +115,12 @@ struct RayVariable {
     std::string name;
     uint32_t size = 0;  ///< bytes of its components, without padding
 };
+/// The record that a traceRayEXT names for a miss, or an executeCallableEXT.
+struct RayCall {
+    static constexpr uint32_t unknown = ~0u;  ///< decided as the shader runs
+    bool is_callable = false;
+    uint32_t record = unknown;
+};
 /// "payload", "incoming payload", ...: the words messages use.
 const char* toString(RayVariable::Kind kind);
 
@@ -128,6 +134,7 @@ struct Reflection {
     std::vector<ShaderVariable> inputs;              ///< vertex stage: attributes
     std::vector<ShaderVariable> outputs;             ///< fragment stage: targets
     std::vector<RayVariable> ray_variables;          ///< ray-tracing stages: those that functions use
+    std::vector<RayCall> ray_calls;                  ///< ray-tracing stages
     uint32_t record_size = 0;                        ///< bytes of the shaderRecordEXT block, 0 if there is none
     uint32_t push_size = 0;                          ///< bytes of the push-constant block, 0 if there is none
     std::array<uint32_t, 3> group_size = {1, 1, 1};  ///< compute, task and mesh stages; constants at their defaults

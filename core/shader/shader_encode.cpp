@@ -143,10 +143,16 @@ void visit(Archive& archive, Value& v) {
     archive(v.kind, v.name, v.size);
 }
 
+template <class Archive, Is<RayCall> Value>
+void visit(Archive& archive, Value& v) {
+    archive(v.is_callable, v.record);
+}
+
 template <class Archive, Is<Reflection> Value>
 void visit(Archive& archive, Value& v) {
-    archive(v.stage, v.entry, v.resources, v.hidden, v.constants, v.inputs, v.outputs, v.ray_variables, v.record_size, v.push_size, v.group_size,
-            v.group_constants, v.uses_ray_query, v.uses_addresses, v.uses_float64, v.uses_int64, v.uses_subgroups);
+    archive(v.stage, v.entry, v.resources, v.hidden, v.constants, v.inputs, v.outputs, v.ray_variables, v.ray_calls,
+            v.record_size, v.push_size, v.group_size, v.group_constants, v.uses_ray_query, v.uses_addresses,
+            v.uses_float64, v.uses_int64, v.uses_subgroups);
 }
 
 }  // namespace

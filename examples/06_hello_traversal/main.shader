@@ -89,15 +89,11 @@ void main() { color = background; }
 void main() { color = vec3(0.0); }
 #endif
 
-#elif SHADOW_MISS_SHADER && RECURSION_DEPTH > 1
+#elif SHADOW_MISS_SHADER
 
 layout(location = 1) rayPayloadInEXT float visible;
 
 void main() { visible = 1.0; }
-
-#elif SHADOW_MISS_SHADER
-
-void main() {}  // no shadow rays are traced
 
 #elif PRIMARY_SHADER || REFLECTION_SHADER
 

@@ -108,10 +108,8 @@ TEST_F(NullDevice, LacksWhatItIsTold) {
     EXPECT_EQ(device.getFeatures().tracingEngine, TracingEngine::Driver);
     EXPECT_THAT(device.getInfo().tracing, testing::HasSubstr("driver"));
     // Also where that is all that was asked for.
-    const Device queries = Device::create({.api = "null",
-                                           .required = FeatureComputeTracing,
-                                           .optional = 0,
-                                           .tracing = TracingEngine::Auto});
+    const Device queries = Device::create(
+        {.api = "null", .required = FeatureComputeTracing, .optional = 0, .tracing = TracingEngine::Auto});
     ASSERT_TRUE(queries);
     EXPECT_EQ(queries.getFeatures().tracingEngine, TracingEngine::Driver);
     EXPECT_TRUE(queries.getFeatures().computeTracing);

@@ -316,12 +316,14 @@ TEST_F(ShaderReflect, RayVariables) {
                                  "layout(location = 1) callableDataEXT uvec2 call;\n"
                                  "layout(location = 2) rayPayloadEXT uint unused;\n"
                                  "void main() {\n"
-                                 "    traceRayEXT(scene, 0u, 0xff, 0, 0, 0, vec3(0.0), 0.0, vec3(1.0), 1.0, 4);\n"
-                                 "    executeCallableEXT(0, 1);\n"
+                                 "    traceRayEXT(scene, 0u, 0xff, 0, 0, 2, vec3(0.0), 0.0, vec3(1.0), 1.0, 4);\n"
+                                 "    executeCallableEXT(gl_LaunchIDEXT.x, 1);\n"
                                  "}\n",
                                  ShaderStage::RayGen);
     EXPECT_FALSE(sender.uses_ray_query);
     EXPECT_EQ(sender.record_size, 0u);
+    ASSERT_EQ(sender.ray_calls.size(), 2u);
+    for (const RayCall& call : sender.ray_calls) EXPECT_EQ(call.record, call.is_callable ? RayCall::unknown : 2u);
     ASSERT_EQ(sender.ray_variables.size(), 2u);
     for (const RayVariable& variable : sender.ray_variables) {
         const bool is_data = variable.name == "data";

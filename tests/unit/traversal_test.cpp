@@ -23,8 +23,8 @@ using null::NullControl;
 class TraversalOnNull : public testing::TestWithParam<TracingEngine> {
 protected:
     void SetUp() override {
-        device = Device::create({.api = "null", .tracing = GetParam(), .message = [](const Message& message) {
-                                     ADD_FAILURE() << message.error.text();
+        device = Device::create({.api = "null", .tracing = GetParam(), .message = [this](const Message& message) {
+                                     if (!is_failing) ADD_FAILURE() << message.error.text();
                                  }});
         ASSERT_TRUE(device) << device.error().text();
         control = NullControl::last();
@@ -85,6 +85,7 @@ void main() {
         return control->counters().barriers - before;
     }
 
+    bool is_failing = false;  ///< on purpose
     Device device;
     std::shared_ptr<NullControl> control;
     Traversal traversal;
@@ -149,6 +150,32 @@ TEST_P(TraversalOnNull, TracesFollowWhatWasBuilt) {
     device.buildTracing(top);
     look();
     EXPECT_THAT(device.finish(), IsOk());
+}
+
+TEST_P(TraversalOnNull, TakesWhatNobodyCalls) {
+    const auto create = [&](const char* miss) {
+        Traversal made = device.createTraversal("made");
+        made.createShaderGLSL(Shader::TypeRayGen, R"(
+layout(binding = 0) uniform accelerationStructureEXT scene;
+layout(binding = 1, std430) writeonly buffer To { float to[]; };
+layout(push_constant) uniform Push { int chosen; };
+layout(location = 0) rayPayloadEXT vec3 color;
+void main() {
+    traceRayEXT(scene, 0u, 0xff, 0, 0, MISS, vec3(0.0), 0.0, vec3(1.0), 1.0, 0);
+    to[0] = color.x;
+})",
+                              std::string("MISS=") + miss);
+        made.createShaderGLSL(Shader::TypeRayMiss,
+                              "layout(location = 0) rayPayloadInEXT vec3 color;\nvoid main() { color = vec3(1.0); }");
+        made.createShaderGLSL(Shader::TypeRayMiss,
+                              "layout(location = 1) rayPayloadInEXT float visible;\nvoid main() { visible = 1.0; }");
+        return made.create();
+    };
+    EXPECT_THAT(create("0"), IsOk());
+    is_failing = true;
+    EXPECT_THAT(create("1"), HasErrorId("traversal.payload"));
+    EXPECT_THAT(create("chosen"), HasErrorId("traversal.payload"));
+    is_failing = false;
 }
 
 TEST_P(TraversalOnNull, GoesWhenTheQueueHasPassedIt) {

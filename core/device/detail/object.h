@@ -306,6 +306,7 @@ public:
 
 private:
     Error checkRecords(const Stages& stages, Where where) const;
+    bool isCalled(const Stages& stages, uint32_t shader) const;
     Error checkVariables(const Stages& stages, Where where) const;
     Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) override;
 };

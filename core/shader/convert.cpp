@@ -87,7 +87,7 @@ std::string refusalOf(const Reflection& reflection, std::span<const uint32_t> wo
     }
     if (reflection.uses_ray_query && is_gl) return "ray queries";
     if (reflection.uses_ray_query && language == ShadingLanguage::MSL) {
-        if (const std::string dropped = droppedRayArguments(words); !dropped.empty()) return dropped;
+        if (std::string dropped = droppedRayArguments(words); !dropped.empty()) return dropped;
     }
     if (reflection.uses_addresses && language != ShadingLanguage::MSL) return "buffer addresses";
     for (const ShaderResource& resource : reflection.resources)

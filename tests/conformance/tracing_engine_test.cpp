@@ -147,6 +147,9 @@ TEST_P(TracingEngineTest, AnOddNumberOfShortIndices) {
 }
 
 TEST_P(TracingEngineTest, RangesAreUsedAgain) {
+    // How many of a round's submissions are under way at once, each with 256 KiB for its uploads, is a matter of
+    // timing. Fifteen structures that stayed would take 300 KiB each.
+    constexpr uint64_t under_way = 4 * (256 << 10);
     uint64_t bytes = 0;
     for (uint32_t i = 0; i < 20; i++) {
         const Tracing bottom = sphere(1.0f, 4);
@@ -155,7 +158,7 @@ TEST_P(TracingEngineTest, RangesAreUsedAgain) {
         ASSERT_THAT(trace(top), IsOk());
         ASSERT_THAT(device.finish(), IsOk());
         if (i == 4) bytes = device.getMemory().bytes;
-        if (i > 4) { EXPECT_LE(device.getMemory().bytes, bytes); }
+        if (i > 4) { EXPECT_LE(device.getMemory().bytes, bytes + under_way); }
     }
 }
 

@@ -139,21 +139,17 @@ TEST_F(TraversalStages, IntersectionsKeepToTheInterval) {
     const Tracing boxes = makeBoxes({{0, 0, -1, 1, 1, 1}});
     const Tracing scene = makeTop({place(boxes)});
     // A bit for each report that was accepted.
-    const auto reporting = [&](std::string_view distances) {
+    const auto reporting = [&](std::initializer_list<const char*> distances) {
+        std::string reports;
+        for (const char* distance : distances)
+            reports += "    accepted = bits | bit;\n    if (reportIntersectionEXT(" + std::string(distance) +
+                       ", kind++)) bits |= bit;\n    bit <<= 1;\n";
         return makeTraversal({down,
                               miss_one,
                               {Shader::TypeIntersection,
                                "hitAttributeEXT uint accepted;\n"
-                               "void main() {\n"
-                               "    const float distances[] = " +
-                                   std::string(distances) +
-                                   ";\n"
-                                   "    uint bits = 0u;\n"
-                                   "    for (uint i = 0u; i < distances.length(); i++) {\n"
-                                   "        accepted = bits | 1u << i;\n"
-                                   "        if (reportIntersectionEXT(distances[i], i)) bits |= 1u << i;\n"
-                                   "    }\n"
-                                   "}\n",
+                               "void main() {\n    uint bits = 0u, bit = 1u, kind = 0u;\n" +
+                                   reports + "}\n",
                                {}},
                               {Shader::TypeClosest,
                                "layout(location = 0) rayPayloadInEXT uint payload;\nhitAttributeEXT uint accepted;\n"
@@ -162,14 +158,17 @@ TEST_F(TraversalStages, IntersectionsKeepToTheInterval) {
                                {}}});
     };
     const RayArguments rays = {.minimum = 2.0f, .maximum = 16.0f};
-    // Below the interval, above it, within, behind what is there by now, before it.
-    EXPECT_EQ(lookDown(reporting("float[](1.75, 16.25, 12.0, 13.0, 4.0)"), scene, 2, rays),
-              (Words{0x14u << 16 | 4u << 8 | 16u, 1}));
-    EXPECT_EQ(lookDown(reporting("float[](1.0, 17.0)"), scene, 1, rays), (Words{1}));
-    EXPECT_EQ(lookDown(reporting("float[](-3.0)"), scene, 1), (Words{1}));
-    EXPECT_EQ(lookDown(reporting("float[](15.75)"), scene, 1, rays), (Words{1u << 16 | 63u}));
+    // Below the interval, within, behind what is there by now, before it. (From a shader that reports one below the
+    // interval and then one above it, the 580 driver of an H100 never comes back.)
+    EXPECT_EQ(lookDown(reporting({"1.75", "12.0", "13.0", "4.0"}), scene, 2, rays),
+              (Words{0xau << 16 | 3u << 8 | 16u, 1}));
+    EXPECT_EQ(lookDown(reporting({"16.25", "4.0"}), scene, 1, rays), (Words{2u << 16 | 1u << 8 | 16u}));
+    EXPECT_EQ(lookDown(reporting({"1.0"}), scene, 1, rays), (Words{1}));
+    EXPECT_EQ(lookDown(reporting({"17.0"}), scene, 1, rays), (Words{1}));
+    EXPECT_EQ(lookDown(reporting({"-3.0"}), scene, 1), (Words{1}));
+    EXPECT_EQ(lookDown(reporting({"15.75"}), scene, 1, rays), (Words{1u << 16 | 63u}));
     // Beside the box nothing asks the shader.
-    EXPECT_EQ(lookDown(reporting("float[](3.0)"), scene, 2, rays)[1], 1u);
+    EXPECT_EQ(lookDown(reporting({"3.0"}), scene, 2, rays)[1], 1u);
 }
 
 TEST_F(TraversalStages, AnyHitJudgesIntersections) {

@@ -380,6 +380,25 @@ TEST_F(NullDevice, BuildsBesideEachOtherShareBarriers) {
 
 // A structure that the host has built is uploaded by a copy where the host does not see the device's memory. If that
 // fails, at whichever step, the structure counts as unbuilt, and can be built again.
+TEST_F(NullDevice, StructuresStayWhereASubmissionWritesThem) {
+    open({}, FeatureComputeTracing, TracingEngine::Software);
+    const Buffer vertices = device.createBuffer(Buffer::FlagTracing, 36 * 100, "vertices");
+    Tracing bottom = device.createTracing("bottom");
+    bottom.addVertexBuffer(300, FormatRGBf32, 12, vertices);
+    ASSERT_THAT(bottom.create(Tracing::TypeTriangle, Tracing::FlagFastTrace), IsOk());
+    // The first build on the device moves it to where any tree fits, the others do not.
+    const auto& object = static_cast<const detail::TracingObject&>(*bottom.object());
+    const uint64_t moves = object.moves;
+    Compute first = device.createCompute();
+    first.buildTracing(bottom);
+    first.buildTracing(bottom);
+    Compute second = device.createCompute();
+    second.buildTracing(bottom);
+    ASSERT_THAT(device.submit({first, second}), IsOk());
+    EXPECT_EQ(object.moves, moves + 1);
+    EXPECT_THAT(device.finish(), IsOk());
+}
+
 TEST_F(NullDevice, StructuresWhoseUploadFailsAreUnbuilt) {
     open({.mapped = false}, FeatureComputeTracing, TracingEngine::Software);
     const Buffer vertices = device.createBuffer(Buffer::FlagTracing, 36 * 100, "vertices");

@@ -326,7 +326,11 @@ Error RecorderCore::placeTracings() {
                 std::memcpy(place, &address, sizeof(address));
                 continue;
             }
-            case Placement::Kind::Move: device_->moveTracing(*tracing, std::move(moves_[placement.place])); continue;
+            case Placement::Kind::Move:
+                // An earlier build of the same submission may have moved it: that place is in use from here on.
+                if (softwareOf(*tracing).range.texels < softwareOf(*tracing).device_texels)
+                    device_->moveTracing(*tracing, std::move(moves_[placement.place]));
+                continue;
             case Placement::Kind::Built: tracing->built_moves = movesOf(tracing->built_references); continue;
             case Placement::Kind::Reference:
                 if (movesOf(tracing->built_references) == tracing->built_moves) break;

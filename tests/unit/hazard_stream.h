@@ -178,7 +178,7 @@ private:
     uint32_t store(std::span<const T> values) {
         const size_t place = (list_->bytes.size() + alignof(T) - 1) / alignof(T) * alignof(T);
         list_->bytes.resize(place + values.size_bytes());
-        std::memcpy(list_->bytes.data() + place, values.data(), values.size_bytes());
+        if (!values.empty()) std::memcpy(list_->bytes.data() + place, values.data(), values.size_bytes());
         return static_cast<uint32_t>(place);
     }
     uint32_t index(Thing* thing) {

@@ -77,6 +77,7 @@ Benchmark tracingLeaksBenchmark();
 Benchmark tracingTradeoffsBenchmark();
 Benchmark traversalOffsetBenchmark();
 Benchmark traversalHelloBenchmark();
+Benchmark parallelBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

@@ -1,7 +1,7 @@
 // <glint/lens.h>, <glint/environment.h>, <glint/random.h> and the refraction of <glint/shading.h> on the device against
 // float64.
 
-#include "support/device_fixture.h"
+#include "support/kernel_values.h"
 #include "support/reference.h"
 
 #include <glint/math/math.h>
@@ -67,21 +67,7 @@ uint32_t hashOf(uint32_t a, uint32_t b) { return hashOf(a * 0x9e3779b9u + hashOf
 
 class LensHelpers : public DeviceTest {
 protected:
-    std::vector<Output> run(const std::vector<Input>& inputs) {
-        Kernel kernel = device.createKernel();
-        kernel.createShaderGLSL(shader);
-        EXPECT_TRUE(kernel.create()) << kernel.error().text();
-        const Buffer in = device.createBuffer(Buffer::FlagStorage, std::span(inputs));
-        const Buffer out = device.createBuffer(Buffer::FlagStorage, inputs.size() * sizeof(Output));
-        Compute compute = device.createCompute();
-        compute.setKernel(kernel);
-        compute.setStorageBuffers(0, {in, out});
-        compute.dispatch(inputs.size());
-        EXPECT_TRUE(device.submit(compute));
-        auto outputs = device.read<Output>(out);
-        EXPECT_TRUE(outputs) << outputs.error().text();
-        return outputs ? *outputs : std::vector<Output>();
-    }
+    std::vector<Output> run(const std::vector<Input>& inputs) { return runOnEach<Output>(device, shader, inputs); }
 };
 
 /// Places on the picture, directions, and surfaces that they meet from above.

@@ -1,6 +1,6 @@
 // PrefixScan against std::exclusive_scan.
 
-#include "support/device_fixture.h"
+#include "support/kernel_values.h"
 #include "support/reference.h"
 
 #include <glint/parallel/prefix_scan.h>
@@ -45,13 +45,6 @@ std::vector<Region> layOut(std::span<const uint32_t> sizes, uint32_t& end) {
 
 class PrefixScanTest : public DeviceTest {
 protected:
-    void expectSame(const Buffer& buffer, const std::vector<uint32_t>& expected) {
-        const auto values = device.read<uint32_t>(buffer);
-        ASSERT_TRUE(values) << values.error().text();
-        const auto [a, b] = std::mismatch(values->begin(), values->end(), expected.begin(), expected.end());
-        EXPECT_TRUE(a == values->end()) << "element " << a - values->begin() << " is " << *a << ", not " << *b;
-    }
-
     void expectSingle(const PrefixScan& scan, uint32_t offset, uint32_t size) {
         SCOPED_TRACE(size);
         std::vector<uint32_t> values = randomValues(offset + size + 2, size);
@@ -61,7 +54,7 @@ protected:
         ASSERT_THAT(device.submit(compute), IsOk());
         const Region region = {offset, size, {}};
         scanOnHost(values, std::span(&region, 1));
-        expectSame(buffer, values);
+        expectValues(device, buffer, values);
     }
 };
 
@@ -99,7 +92,7 @@ TEST_F(PrefixScanTest, TakesEverySizeInOneList) {
     Compute compute = device.createCompute();
     many.dispatch(compute, buffer, regions);
     ASSERT_THAT(device.submit(compute), IsOk());
-    expectSame(buffer, expected);
+    expectValues(device, buffer, expected);
 
     // The same sizes one by one, with few groups, so that sizes below and above a group's share occur.
     PrefixScan single;
@@ -108,7 +101,7 @@ TEST_F(PrefixScanTest, TakesEverySizeInOneList) {
     Compute list = device.createCompute();
     for (const Region& region : regions) single.dispatch(list, again, region.offset, region.size);
     ASSERT_THAT(device.submit(list), IsOk());
-    expectSame(again, expected);
+    expectValues(device, again, expected);
     EXPECT_THAT(many.check(), IsOk());
     EXPECT_THAT(single.check(), IsOk());
 }
@@ -132,7 +125,7 @@ TEST_F(PrefixScanTest, TakesRegionsFromTheDevice) {
         ASSERT_THAT(device.submit(compute), IsOk());
         std::vector<uint32_t> expected = values;
         scanOnHost(expected, std::span(regions).subspan(first, count));
-        expectSame(buffer, expected);
+        expectValues(device, buffer, expected);
     };
     expectFrom(4, 1, [&](Compute& c, const Buffer& b) { scan.dispatchIndirect(c, b, where, 64); });
     expectFrom(4, 96, [&](Compute& c, const Buffer& b) { scan.dispatchIndirect(c, b, 96, where, 64); });
@@ -157,7 +150,7 @@ TEST_F(PrefixScanTest, LeavesWhatTheDeviceGetsWrong) {
     Compute compute = device.createCompute();
     scan.dispatchIndirect(compute, buffer, 5, regions);
     ASSERT_THAT(device.submit(compute), IsOk());
-    expectSame(buffer, expected);
+    expectValues(device, buffer, expected);
     EXPECT_THAT(scan.check(), HasErrorId("parallel.outside"));
     EXPECT_THAT(scan.check(), IsOk());
 
@@ -171,7 +164,7 @@ TEST_F(PrefixScanTest, LeavesWhatTheDeviceGetsWrong) {
     Compute single = device.createCompute();
     scan.dispatchIndirect(single, other, regions);
     ASSERT_THAT(device.submit(single), IsOk());
-    expectSame(other, values);
+    expectValues(device, other, values);
     EXPECT_THAT(scan.check(), HasErrorId("parallel.outside"));
 }
 

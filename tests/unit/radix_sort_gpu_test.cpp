@@ -1,6 +1,6 @@
 // RadixSort against std::stable_sort.
 
-#include "support/device_fixture.h"
+#include "support/kernel_values.h"
 
 #include <glint/parallel/radix_sort.h>
 
@@ -81,13 +81,6 @@ std::vector<Region> layOut(std::span<const uint32_t> sizes, uint32_t& end) {
 
 class RadixSortTest : public DeviceTest {
 protected:
-    void expectSame(const Buffer& buffer, const std::vector<uint32_t>& expected) {
-        const auto values = device.read<uint32_t>(buffer);
-        ASSERT_TRUE(values) << values.error().text();
-        const auto [a, b] = std::mismatch(values->begin(), values->end(), expected.begin(), expected.end());
-        EXPECT_TRUE(a == values->end()) << "element " << a - values->begin() << " is " << *a << ", not " << *b;
-    }
-
     void expectSingle(const RadixSort& sort, RadixSort::Flags flags, uint32_t size, Keys kind, uint32_t bits = 32) {
         SCOPED_TRACE(testing::Message() << size << " keys of kind " << static_cast<int>(kind) << ", " << bits
                                         << " bits");
@@ -99,7 +92,7 @@ protected:
         sort.dispatch(compute, buffer, region.keys, region.payload, size, bits);
         ASSERT_THAT(device.submit(compute), IsOk());
         sortOnHost(values, std::span(&region, 1), flags, bits);
-        expectSame(buffer, values);
+        expectValues(device, buffer, values);
     }
 };
 
@@ -162,7 +155,7 @@ TEST_F(RadixSortTest, TakesEverySizeInOneList) {
     sort.dispatch(compute, buffer, regions);
     ASSERT_THAT(device.submit(compute), IsOk());
     sortManyOnHost(values, regions, 32);
-    expectSame(buffer, values);
+    expectValues(device, buffer, values);
     EXPECT_THAT(sort.check(), IsOk());
 }
 
@@ -184,7 +177,7 @@ TEST_F(RadixSortTest, TakesRegionsFromTheDevice) {
         ASSERT_THAT(device.submit(compute), IsOk());
         std::vector<uint32_t> expected = values;
         sortManyOnHost(expected, std::span(regions).subspan(first, count), 32);
-        expectSame(buffer, expected);
+        expectValues(device, buffer, expected);
     };
     for (const RadixSort::Flags flags :
          {RadixSort::FlagMultiple | 0u, RadixSort::FlagSingle | RadixSort::FlagMultiple}) {
@@ -213,7 +206,7 @@ TEST_F(RadixSortTest, OrdersFloats) {
     Compute compute = device.createCompute();
     sort.dispatch(compute, buffer, 0, 0, 14);
     ASSERT_THAT(device.submit(compute), IsOk());
-    expectSame(buffer, keys);
+    expectValues(device, buffer, keys);
     for (const float value : sorted)
         EXPECT_EQ(std::bit_cast<uint32_t>(sortValue(sortKey(value))), std::bit_cast<uint32_t>(value));
 
@@ -245,7 +238,7 @@ void main() {
         expected.push_back(sortKey(value));
         expected.push_back(std::bit_cast<uint32_t>(value));
     }
-    expectSame(made, expected);
+    expectValues(device, made, expected);
 }
 
 TEST_F(RadixSortTest, LeavesWhatTheDeviceGetsWrong) {
@@ -266,17 +259,19 @@ TEST_F(RadixSortTest, LeavesWhatTheDeviceGetsWrong) {
         return buffer;
     };
     ASSERT_THAT(sort.create(device, RadixSort::FlagMultiple, 300), IsOk());
-    expectSame(run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, 5, regions); }), expected);
+    expectValues(device, run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, 5, regions); }), expected);
     EXPECT_THAT(sort.check(), HasErrorId("parallel.outside"));
     EXPECT_THAT(sort.check(), IsOk());
-    expectSame(run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, how_many, regions, 0, 64); }),
-               expected);
+    expectValues(device,
+                 run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, how_many, regions, 0, 64); }),
+                 expected);
     EXPECT_THAT(sort.check(), HasErrorId("parallel.count"));
     for (const RadixSort::Flags flags : {RadixSort::FlagSingle, RadixSort::FlagMultiple}) {
         ASSERT_THAT(sort.create(device, flags | 0u, 199), IsOk());
-        expectSame(run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, regions, 64); }), values);
+        expectValues(device, run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, regions, 64); }),
+                     values);
         EXPECT_THAT(sort.check(), HasErrorId("parallel.room"));
-        expectSame(run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, regions); }), values);
+        expectValues(device, run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, regions); }), values);
         EXPECT_THAT(sort.check(), HasErrorId("parallel.outside"));
     }
     // Two regions of 200 where there is room for one: either may be the one that is sorted.

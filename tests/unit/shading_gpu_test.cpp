@@ -1,6 +1,6 @@
 // <glint/shading.h> on the device against float64.
 
-#include "support/device_fixture.h"
+#include "support/kernel_values.h"
 #include "support/reference.h"
 
 #include <algorithm>
@@ -59,23 +59,13 @@ TEST_F(ShadingHelpers, AreWhatFloat64Gives) {
         inputs.push_back({Vector4f(Vector3f(direction), 0), Vector4f(Vector3f(normal), 0),
                           Vector4f(Vector3f(geometric), 0), Vector4f(Vector3f(random.direction()), 0)});
     }
-    Kernel kernel = device.createKernel();
-    kernel.createShaderGLSL(shader);
-    ASSERT_TRUE(kernel.create()) << kernel.error().text();
-    const Buffer in = device.createBuffer(Buffer::FlagStorage, std::span(inputs));
-    const Buffer out = device.createBuffer(Buffer::FlagStorage, inputs.size() * sizeof(Output));
-    Compute compute = device.createCompute();
-    compute.setKernel(kernel);
-    compute.setStorageBuffers(0, {in, out});
-    compute.dispatch(inputs.size());
-    ASSERT_TRUE(device.submit(compute));
-    const auto outputs = device.read<Output>(out);
-    ASSERT_TRUE(outputs) << outputs.error().text();
+    const std::vector<Output> outputs = runOnEach<Output>(device, shader, inputs);
+    ASSERT_EQ(outputs.size(), inputs.size());
 
     constexpr double u = 0x1p-24;
     uint32_t below = 0, dark = 0, clamped = 0;
     for (size_t i = 0; i < inputs.size(); i++) {
-        const Output& output = (*outputs)[i];
+        const Output& output = outputs[i];
         const Vector3d direction(Vector3f(inputs[i].direction)), normal(Vector3f(inputs[i].normal));
         const Vector3d geometric(Vector3f(inputs[i].geometric)), to_light(Vector3f(inputs[i].to_light));
 

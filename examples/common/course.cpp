@@ -67,8 +67,7 @@ CourseBuffers::CourseBuffers(Device& device, const CourseStage& stage, const Arr
         object.addVertexBuffer(static_cast<uint32_t>(vertices_), FormatRGBf32, stride, vertex_buffer_);
         object.addIndexBuffer(static_cast<uint32_t>(stage.mesh(i).indices.size()), FormatRu32, index_buffer_,
                               uint64_t{instances[i].data} * 3 * sizeof(uint32_t));
-        (void)object.create(Tracing::TypeTriangle,
-                            Tracing::FlagFastTrace);  // carried by the handle
+        (void)object.create(Tracing::TypeTriangle, Tracing::FlagFastTrace);  // carried by the handle
     }
     for (uint32_t i = 0; i < instances.size(); i++) instances[i].tracing = &objects_[i];
     if (arrange) {
@@ -96,9 +95,7 @@ uint64_t CourseBuffers::tracingMemory() const {
 
 Course::Course(Example& example, std::string shader) : example_(example), shader_(std::move(shader)) {
     example_.add("--mesh", mesh_, "Mesh to show (.obj, .ply, .gltf, .glb); a torus without it");
-    example_.add("--query", use_query_,
-                 "Trace by ray queries in a compute shader instead of a "
-                 "ray-tracing pipeline");
+    example_.add("--query", use_query_, "Trace by ray queries in a compute shader instead of a ray-tracing pipeline");
 }
 
 int Course::run(uint32_t recursion, const std::function<void(Traversal&)>& load,
@@ -110,8 +107,7 @@ int Course::run(uint32_t recursion, const std::function<void(Traversal&)>& load,
     if (!device) return report(device.error());
     use_query_ = use_query_ || needsQueries(example_, device, recursion);
 
-    // Before the structures, which are built for the programs that the device
-    // has.
+    // Before the structures, which are built for the programs that the device has.
     Kernel kernel;
     Traversal traversal;
     if (use_query_) {

@@ -1,0 +1,41 @@
+#include <glint/format/splats.h>
+
+#include <glint/base/format_error.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace glint {
+
+Status Splats::validate() const {
+    if (degree > max_degree)
+        return makeError(ErrorCode::OutOfRange, "splats.degree", "splats: harmonics of degree {}; 0 to {} are known",
+                         degree, max_degree);
+    const auto checkCount = [this](const char* what, size_t count, size_t expected) -> Status {
+        if (count == expected) return {};
+        return makeError(ErrorCode::InvalidArgument, "splats.count", "splats: {} {} for {} positions; {} are needed",
+                         count, what, positions.size(), expected);
+    };
+    if (Status status = checkCount("scales", scales.size(), size()); !status) return status;
+    if (Status status = checkCount("rotations", rotations.size(), size()); !status) return status;
+    if (Status status = checkCount("opacities", opacities.size(), size()); !status) return status;
+    if (Status status = checkCount("harmonics", harmonics.size(), size() * coefficientCount()); !status) return status;
+
+    const auto fail = [](size_t splat, const char* what) {
+        return makeError(ErrorCode::InvalidArgument, "splats.value", "splats: splat {}: {}", splat, what);
+    };
+    for (size_t i = 0; i < size(); i++) {
+        if (!isFinite(positions[i])) return fail(i, "a coordinate of its position is not finite");
+        const Vector3f& s = scales[i];
+        if (!isFinite(s) || s.x < 0 || s.y < 0 || s.z < 0) return fail(i, "a scale is negative or not finite");
+        if (!(opacities[i] >= 0.0f && opacities[i] <= 1.0f)) return fail(i, "its opacity is not within 0 and 1");
+        const Vector4f& q = rotations[i];
+        if (!(std::abs(q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w - 1.0f) <= 2e-3f))
+            return fail(i, "its quaternion is not of length 1");
+        const auto first = harmonics.begin() + static_cast<std::ptrdiff_t>(i * coefficientCount());
+        if (!std::all_of(first, first + coefficientCount(), isFinite)) return fail(i, "a harmonic is not finite");
+    }
+    return {};
+}
+
+}  // namespace glint

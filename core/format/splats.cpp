@@ -1,11 +1,42 @@
 #include <glint/format/splats.h>
 
+#include <glint/base/file.h>
 #include <glint/base/format_error.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 namespace glint {
+
+namespace {
+
+std::string extension(const std::filesystem::path& path) {
+    std::string text = path.extension().string();
+    for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    return text;
+}
+
+Error unknownExtension(const std::filesystem::path& path) {
+    return makeError(ErrorCode::Unsupported, "splats.unknown_extension", "'{}': splats end in .ply, not in '{}'",
+                     path.string(), path.extension().string());
+}
+
+}  // namespace
+
+Expected<Splats> Splats::load(const std::filesystem::path& path, uint64_t limit, SplatReport* report) {
+    if (extension(path) != ".ply") return unexpected(unknownExtension(path));
+    const Expected<std::vector<std::byte>> bytes = readFile(path, limit);
+    if (!bytes) return unexpected(bytes.error());
+    return parsePlySplats(*bytes, path.filename().string(), limit, report);
+}
+
+Status Splats::save(const std::filesystem::path& path) const {
+    if (extension(path) != ".ply") return unknownExtension(path);
+    const Expected<std::vector<std::byte>> bytes = encodePlySplats(*this);
+    if (!bytes) return bytes.error();
+    return writeFile(path, *bytes);
+}
 
 Status Splats::validate() const {
     if (degree > max_degree)

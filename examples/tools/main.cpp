@@ -1,4 +1,5 @@
-// glint: looks at adapters, compiles and converts shaders, casts rays at meshes. One source for each subcommand.
+// glint: looks at adapters, compiles and converts shaders, casts rays at meshes, handles Gaussian splats. One source
+// for each subcommand.
 
 #include "tool.h"
 
@@ -54,10 +55,12 @@ int failUsage(const char* command, const std::string& text) {
 }  // namespace tool
 
 int main(int argc, char** argv) {
-    CLI::App app("Looks at adapters, compiles and converts shaders, casts rays at meshes.", "glint");
+    CLI::App app("Looks at adapters, compiles and converts shaders, casts rays at meshes, handles Gaussian splats.",
+                 "glint");
     app.set_help_flag("-h,--help", "Print this and end");
     app.require_subcommand(1);
-    const std::array commands = {tool::infoCommand(app), tool::shaderCommand(app), tool::castCommand(app)};
+    const std::array commands = {tool::infoCommand(app), tool::shaderCommand(app), tool::castCommand(app),
+                                 tool::splatCommand(app)};
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

@@ -29,6 +29,7 @@ struct Command {
 Command infoCommand(CLI::App& app);
 Command shaderCommand(CLI::App& app);
 Command castCommand(CLI::App& app);
+Command splatCommand(CLI::App& app);
 
 /// Adds --tracing auto|driver|software: the engine for ray tracing.
 void addTracing(CLI::App& app, glint::TracingEngine& engine);

@@ -20,28 +20,50 @@ using FilePtr = std::unique_ptr<std::FILE, FileCloser>;
 
 template <class Bytes>
 Expected<Bytes> readAll(const std::filesystem::path& path, uint64_t limit) {
-    std::error_code failure;
-    if (std::filesystem::is_directory(path, failure))
-        return unexpected(makeError(ErrorCode::Io, "file.open", "cannot read '{}': it is a directory", path.string()));
-    FilePtr file(std::fopen(path.c_str(), "rb"));
-    if (!file)
-        return unexpected(
-            makeError(ErrorCode::Io, "file.open", "cannot open '{}': {}", path.string(), std::strerror(errno)));
-    const uint64_t size = std::filesystem::file_size(path, failure);
-    if (failure)
-        return unexpected(
-            makeError(ErrorCode::Io, "file.read", "cannot size '{}': {}", path.string(), failure.message()));
-    if (size > limit)
+    const Expected<InputFile> file = InputFile::open(path);
+    if (!file) return unexpected(file.error());
+    if (file->size() > limit)
         return unexpected(makeError(ErrorCode::Io, "file.too_large", "'{}' has {} bytes, the limit is {}",
-                                    path.string(), size, limit));
+                                    path.string(), file->size(), limit));
     Bytes bytes;
-    bytes.resize(size);
-    if (size != 0 && std::fread(bytes.data(), 1, size, file.get()) != size)
-        return unexpected(makeError(ErrorCode::Io, "file.read", "cannot read {} bytes of '{}'", size, path.string()));
+    bytes.resize(file->size());
+    if (Status status = file->read(0, std::as_writable_bytes(std::span(bytes))); !status)
+        return unexpected(status.error());
     return bytes;
 }
 
 }  // namespace
+
+Expected<InputFile> InputFile::open(const std::filesystem::path& path) {
+    std::error_code failure;
+    if (std::filesystem::is_directory(path, failure))
+        return unexpected(makeError(ErrorCode::Io, "file.open", "cannot read '{}': it is a directory", path.string()));
+    InputFile result;
+    result.name_ = path.string();
+    result.file_ = FilePtr(std::fopen(path.c_str(), "rb"));
+    if (!result.file_)
+        return unexpected(
+            makeError(ErrorCode::Io, "file.open", "cannot open '{}': {}", path.string(), std::strerror(errno)));
+    result.size_ = std::filesystem::file_size(path, failure);
+    if (failure)
+        return unexpected(
+            makeError(ErrorCode::Io, "file.read", "cannot size '{}': {}", path.string(), failure.message()));
+    return result;
+}
+
+Status InputFile::read(uint64_t offset, std::span<std::byte> destination) const {
+    const int descriptor = ::fileno(file_.get());
+    for (size_t done = 0; done < destination.size();) {
+        const ssize_t count = ::pread(descriptor, destination.data() + done, destination.size() - done,
+                                      static_cast<off_t>(offset + done));
+        if (count < 0 && errno == EINTR) continue;
+        if (count <= 0)
+            return makeError(ErrorCode::Io, "file.read", "cannot read byte {} of '{}': {}", offset + done, name_,
+                             count < 0 ? std::strerror(errno) : "the file ends there");
+        done += static_cast<size_t>(count);
+    }
+    return {};
+}
 
 Expected<std::vector<std::byte>> readFile(const std::filesystem::path& path, uint64_t limit) {
     return readAll<std::vector<std::byte>>(path, limit);

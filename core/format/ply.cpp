@@ -92,7 +92,8 @@ void gather(PlyEncoding encoding, PlyType type, const std::byte* from, size_t fr
 /// The lines of a header, and what they say.
 class HeaderParser {
 public:
-    HeaderParser(std::span<const std::byte> file, const std::string& name) : text_(textOf(file)), name_(name) {}
+    HeaderParser(std::span<const std::byte> file, const std::string& name, uint64_t size)
+        : text_(textOf(file)), name_(name), size_(std::max<uint64_t>(size, file.size())) {}
 
     Expected<PlyHeader> parse() {
         if (!text_.starts_with("ply\n") && !text_.starts_with("ply\r"))
@@ -216,7 +217,7 @@ private:
     }
 
     Status checkCounts() const {
-        uint64_t left = text_.size() - at_;
+        uint64_t left = size_ - at_;
         for (const PlyElement& element : header_.elements) {
             // A number of a text is a digit and what parts it from the next; nothing need follow the last one.
             const bool is_text = header_.encoding == PlyEncoding::Ascii;
@@ -226,7 +227,7 @@ private:
                 return Error::inFile(ErrorCode::Io, "ply.truncated",
                                      fmt::format("{} records of element '{}' take {} bytes each or more, and from byte "
                                                  "{} on the file has {} for them",
-                                                 element.count, excerpt(element.name), size, text_.size() - left, left),
+                                                 element.count, excerpt(element.name), size, size_ - left, left),
                                      name_, 0);
             left -= std::min(left, element.count * size);
         }
@@ -235,6 +236,7 @@ private:
 
     std::string_view text_;
     const std::string& name_;
+    uint64_t size_ = 0;  // of the whole file
     char line_end_ = '\n';
     size_t at_ = 0;
     uint32_t line_ = 0;
@@ -262,8 +264,8 @@ const PlyElement* PlyHeader::find(std::string_view element) const {
     return found == elements.end() ? nullptr : &*found;
 }
 
-Expected<PlyHeader> parsePlyHeader(std::span<const std::byte> file, const std::string& name) {
-    return HeaderParser(file, name).parse();
+Expected<PlyHeader> parsePlyHeader(std::span<const std::byte> file, const std::string& name, uint64_t size) {
+    return HeaderParser(file, name, size).parse();
 }
 
 PlyReader::PlyReader(std::span<const std::byte> file, const PlyHeader& header, const std::string& name)

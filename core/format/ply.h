@@ -56,9 +56,10 @@ struct PlyHeader {
 
 /// Reads the header of a PLY file of format 1.0, whose lines end in LF, CR LF or CR. The file is known to be long
 /// enough for the counts of its elements with every list empty, so nobody is led to make room for more than the file
-/// can hold. `name` names the file in errors, which have the line. Errors: "ply.header" (no PLY file; a line, a type or
-/// a count that cannot be read; a name twice in one place), "ply.truncated".
-Expected<PlyHeader> parsePlyHeader(std::span<const std::byte> file, const std::string& name);
+/// can hold. `name` names the file in errors, which have the line. Where `file` is but the begin of a file, `size` is
+/// that of the whole. Errors: "ply.header" (no PLY file; a line, a type or a count that cannot be read; a name twice in
+/// one place), "ply.truncated".
+Expected<PlyHeader> parsePlyHeader(std::span<const std::byte> file, const std::string& name, uint64_t size = 0);
 
 /// Reads the data of a PLY file: each element in turn, in the order of the header. Values are handed over in the types
 /// given here, whatever their type in the file; float64 and 32-bit integers are rounded to nearest where that is

@@ -2,6 +2,7 @@
 
 #include <glint/base/file.h>
 #include <glint/base/format_error.h>
+#include <glint/format/detail/splat_blocks.h>
 
 #include <algorithm>
 #include <cctype>
@@ -18,22 +19,30 @@ std::string extension(const std::filesystem::path& path) {
 }
 
 Error unknownExtension(const std::filesystem::path& path) {
-    return makeError(ErrorCode::Unsupported, "splats.unknown_extension", "'{}': splats end in .ply, not in '{}'",
-                     path.string(), path.extension().string());
+    return makeError(ErrorCode::Unsupported, "splats.unknown_extension",
+                     "'{}': splats end in .ply, .splat or .spz, not in '{}'", path.string(), path.extension().string());
 }
 
 }  // namespace
 
 Expected<Splats> Splats::load(const std::filesystem::path& path, uint64_t limit, SplatReport* report) {
-    if (extension(path) != ".ply") return unexpected(unknownExtension(path));
-    const Expected<std::vector<std::byte>> bytes = readFile(path, limit);
-    if (!bytes) return unexpected(bytes.error());
-    return parsePlySplats(*bytes, path.filename().string(), limit, report);
+    const std::string kind = extension(path);
+    if (kind == ".ply") return detail::loadPlySplats(path, limit, report);
+    if (kind == ".splat") return detail::loadDotSplat(path, limit, report);
+    if (kind == ".spz") {
+        const Expected<std::vector<std::byte>> bytes = readFile(path, limit);
+        if (!bytes) return unexpected(bytes.error());
+        return parseSpz(*bytes, path.filename().string(), limit, report);
+    }
+    return unexpected(unknownExtension(path));
 }
 
 Status Splats::save(const std::filesystem::path& path) const {
-    if (extension(path) != ".ply") return unknownExtension(path);
-    const Expected<std::vector<std::byte>> bytes = encodePlySplats(*this);
+    const std::string kind = extension(path);
+    if (kind != ".ply" && kind != ".splat" && kind != ".spz") return unknownExtension(path);
+    const Expected<std::vector<std::byte>> bytes = kind == ".ply"     ? encodePlySplats(*this)
+                                                   : kind == ".splat" ? encodeDotSplat(*this)
+                                                                      : encodeSpz(*this);
     if (!bytes) return bytes.error();
     return writeFile(path, *bytes);
 }

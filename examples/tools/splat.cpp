@@ -35,7 +35,7 @@ int runInfo(const InfoOptions& options) {
 Command splatInfoCommand(CLI::App& app) {
     auto options = std::make_shared<InfoOptions>();
     CLI::App* sub = app.add_subcommand("info", "What a scene of splats holds");
-    sub->add_option("SPLATS", options->splats, "Splats (.ply)")->required();
+    sub->add_option("SPLATS", options->splats, "Splats (.ply, .splat, .spz)")->required();
     return {sub, [options] { return runInfo(*options); }};
 }
 
@@ -54,8 +54,8 @@ int runConvert(const ConvertOptions& options) {
 Command splatConvertCommand(CLI::App& app) {
     auto options = std::make_shared<ConvertOptions>();
     CLI::App* sub = app.add_subcommand("convert", "Writes a scene of splats in another format");
-    sub->add_option("FROM", options->from, "Splats to read (.ply)")->required();
-    sub->add_option("TO", options->to, "Where to write them (.ply)")->required();
+    sub->add_option("FROM", options->from, "Splats to read (.ply, .splat, .spz)")->required();
+    sub->add_option("TO", options->to, "Where to write them (.ply, .splat, .spz)")->required();
     return {sub, [options] { return runConvert(*options); }};
 }
 

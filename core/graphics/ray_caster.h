@@ -3,6 +3,7 @@
 #include <glint/device/device.h>
 #include <glint/format/mesh.h>
 #include <glint/format/mesh_scene.h>
+#include <glint/math/ray.h>
 
 #include <cstdint>
 #include <functional>
@@ -12,18 +13,6 @@
 #include <vector>
 
 namespace glint {
-
-/// A ray: the points origin + t * direction with t_min <= t <= t_max. The direction may have any length; t counts in
-/// that length. A negative t_min counts as 0.
-///
-/// Rays that mean nothing miss: a NaN anywhere, an infinite origin or direction, a direction of length zero (or whose
-/// components are all smaller than 2^-126), t_min > t_max. An infinite t_max is no limit.
-struct Ray {
-    Vector3f origin = Vector3f(0.0f);
-    float t_min = 0.0f;
-    Vector3f direction = Vector3f(0.0f);
-    float t_max = std::numeric_limits<float>::infinity();
-};
 
 /// Where a ray meets a mesh, or instances of meshes, first.
 struct RayHit {

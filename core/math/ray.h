@@ -1,13 +1,27 @@
 #pragma once
 
-// Points to start rays from and to end them at, normals under transforms, and scenes far from the origin.
+// Rays; points to start them from and to end them at, normals under transforms, and scenes far from the origin.
 // docs/rays.md derives the bounds and says what is promised. shaders/ray.h has the same functions for GLSL, called
 // glintSurfacePoint and so on: sums and products give the same bits on both sides, lengths (of normals, and what is
 // divided by them) differ by Vulkan's errors of division and square root.
 
 #include <glint/math/math.h>
 
+#include <limits>
+
 namespace glint {
+
+/// A ray: the points origin + t * direction with t_min <= t <= t_max. The direction may have any length; t counts in
+/// that length. A negative t_min counts as 0.
+///
+/// Rays that mean nothing miss: a NaN anywhere, an infinite origin or direction, a direction of length zero (or whose
+/// components are all smaller than 2^-126), t_min > t_max. An infinite t_max is no limit.
+struct Ray {
+    Vector3f origin = Vector3f(0.0f);
+    float t_min = 0.0f;
+    Vector3f direction = Vector3f(0.0f);
+    float t_max = std::numeric_limits<float>::infinity();
+};
 
 /// Where a segment ends, in its own lengths: 1 - 2^-20.
 constexpr float segment_end = 1.0f - 0x1p-20f;

@@ -1,0 +1,50 @@
+#pragma once
+
+// Scenes of Gaussian splats that renderers are tried on. All but the one read from a file are made by formula, and are
+// the same everywhere.
+
+#include <glint/format/splats.h>
+#include <glint/math/camera.h>
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace glint::test {
+
+struct SplatScene {
+    std::string name;
+    Splats splats;
+    Camera camera;
+    uint32_t width = 0, height = 0;
+};
+
+/// A splat without harmonics beyond the color, which is the one seen (0 and more).
+void addSplat(Splats& splats, const Vector3f& position, const Vector3f& scales, const Vector4f& rotation, float opacity,
+              const Vector3f& color);
+
+/// The file of splats that $GLINT_SPLATS names, of a real scene; empty if there is none.
+std::filesystem::path splatsPath();
+
+/// At the beginning of a test: skips it where no scene is named.
+#define GLINT_NEED_SPLATS() \
+    if (::glint::test::splatsPath().empty()) GTEST_SKIP() << "needs a scene of splats: GLINT_SPLATS=FILE.ply"
+
+/// A camera that sees all of a scene from a direction, filling the height of the picture.
+Camera cameraAround(const Splats& splats, const Vector3f& from, float fov, uint32_t width, uint32_t height);
+
+/// The surface of a torus: flat discs that overlap, opaque in their middle, with harmonics of a degree that change as
+/// the light on something glossy does.
+SplatScene surfaceScene(uint32_t count, uint32_t degree, uint32_t width, uint32_t height);
+
+/// Needles, 2 * `sigma` pixels long and 0.2 wide, through the middle of the picture at `count` angles.
+SplatScene needleScene(uint32_t count, float sigma, uint32_t width, uint32_t height);
+
+/// `count` small splats of random colors within 16 x 16 pixels that are one tile, and a few around.
+SplatScene crowdScene(uint32_t count, float opacity);
+
+/// What is hard in some way. Names: needles, crowd, inside, near, opacity, equal_depths, faint, flat, huge, beside,
+/// wide, narrow.
+std::vector<SplatScene> hardSplatScenes();
+
+}  // namespace glint::test

@@ -67,7 +67,7 @@ SplatScene nearScene() {
         const float z = i % 3 == 0 ? between(random, 0.201, 0.21)
                                    : (i % 3 == 1 ? between(random, -0.3, 0.199) : between(random, 0.21, 1.0));
         addSplat(scene.splats, {between(random, -0.5, 0.5), z, between(random, -0.5, 0.5)},
-                 {between(random, 0.001, 0.1), between(random, 0.01, 0.3), between(random, 0.01, 0.3)},
+                 {between(random, 0.001, 0.1), between(random, 0.01, 0.15), between(random, 0.01, 0.15)},
                  anyRotation(random), between(random, 0.02, 0.6), anyColor(random));
     }
     return scene;
@@ -118,10 +118,11 @@ SplatScene hugeScene() {
     SplatScene scene = frontal("huge", 64, 48);
     Random random(17);
     for (int i = 0; i < 60; i++) {
+        // Sheets, needles and clouds of up to a million units.
         const float size = std::exp(between(random, 0.0, std::log(1e6)));
+        const auto other = [&] { return std::exp(between(random, std::log(0.01), std::log(size))); };
         addSplat(scene.splats, {between(random, -1, 1), between(random, 1, 9), between(random, -1, 1)},
-                 {size, size * between(random, 1e-3, 1), size * between(random, 1e-3, 1)}, anyRotation(random),
-                 between(random, 0.01, 0.3), anyColor(random));
+                 {size, other(), other()}, anyRotation(random), between(random, 0.02, 0.8), anyColor(random));
     }
     return scene;
 }
@@ -136,8 +137,8 @@ SplatScene besideScene() {
         const float z = between(random, 0.5, 2.0);
         addSplat(scene.splats,
                  {static_cast<float>(std::cos(angle) * away) * z, z, static_cast<float>(std::sin(angle) * away) * z},
-                 {between(random, 0.05, 0.6), between(random, 0.05, 0.6), between(random, 0.05, 0.6)},
-                 anyRotation(random), between(random, 0.05, 0.5), anyColor(random));
+                 {between(random, 0.02, 0.4), between(random, 0.02, 0.4), between(random, 0.02, 0.4)},
+                 anyRotation(random), between(random, 0.05, 0.9), anyColor(random));
     }
     return scene;
 }
@@ -175,14 +176,23 @@ std::filesystem::path splatsPath() {
     return name;
 }
 
-Camera cameraAround(const Splats& splats, const Vector3f& from, float fov, uint32_t width, uint32_t height) {
+Camera cameraAround(const Splats& splats, const Vector3f& from, const Vector3f& up, float fov, uint32_t width,
+                    uint32_t height) {
     const BoundBox box = splats.bounds();
     const Vector3f centre = box.center();
     const float radius = glm::length(box.size()) * 0.5f;
     const float distance = radius / std::sin(radians(fov) * 0.5f);
     return Camera()
-        .lookAt(centre + glm::normalize(from) * distance, centre)
+        .lookAt(centre + from * distance, centre, up)
         .perspective(fov, static_cast<float>(width) / static_cast<float>(height), 0.1f);
+}
+
+Expected<SplatScene> realSplatScene(uint32_t width, uint32_t height) {
+    Expected<Splats> splats = Splats::load(splatsPath());
+    if (!splats) return unexpected(splats.error());
+    // Trained scenes have Y down.
+    const Camera camera = cameraAround(*splats, {0.16f, -0.12f, 0.42f}, {0, -1, 0}, 50.0f, width, height);
+    return SplatScene{"playbot", std::move(*splats), camera, width, height};
 }
 
 SplatScene surfaceScene(uint32_t count, uint32_t degree, uint32_t width, uint32_t height) {
@@ -211,7 +221,7 @@ SplatScene surfaceScene(uint32_t count, uint32_t degree, uint32_t width, uint32_
         for (uint32_t k = 1; k < splats.coefficientCount(); k++)
             harmonics[k] = Vector3f(0.1f, 0.08f, 0.06f) * between(random, -1, 1) * static_cast<float>(light);
     }
-    scene.camera = cameraAround(splats, {1.0f, -1.5f, 1.1f}, 40.0f, width, height);
+    scene.camera = cameraAround(splats, {0.36f, -0.54f, 0.4f}, {0, 0, 1}, 40.0f, width, height);
     return scene;
 }
 

@@ -3,6 +3,7 @@
 // Scenes of Gaussian splats that renderers are tried on. All but the one read from a file are made by formula, and are
 // the same everywhere.
 
+#include <glint/base/expected.h>
 #include <glint/format/splats.h>
 #include <glint/math/camera.h>
 
@@ -30,8 +31,13 @@ std::filesystem::path splatsPath();
 #define GLINT_NEED_SPLATS() \
     if (::glint::test::splatsPath().empty()) GTEST_SKIP() << "needs a scene of splats: GLINT_SPLATS=FILE.ply"
 
-/// A camera that sees all of a scene from a direction, filling the height of the picture.
-Camera cameraAround(const Splats& splats, const Vector3f& from, float fov, uint32_t width, uint32_t height);
+/// A camera that looks at the middle of a scene from `from` away, in units of the distance from which all of it is seen
+/// for certain.
+Camera cameraAround(const Splats& splats, const Vector3f& from, const Vector3f& up, float fov, uint32_t width,
+                    uint32_t height);
+
+/// The scene of splatsPath(), as figures name it. Errors: those of Splats::load.
+Expected<SplatScene> realSplatScene(uint32_t width, uint32_t height);
 
 /// The surface of a torus: flat discs that overlap, opaque in their middle, with harmonics of a degree that change as
 /// the light on something glossy does.

@@ -2,6 +2,7 @@
 
 #include <glint/base/file.h>
 #include <glint/base/format_error.h>
+#include <glint/format/detail/json_text.h>
 
 #include <nlohmann/json.hpp>
 
@@ -20,51 +21,6 @@ namespace {
 using nlohmann::json;
 
 constexpr size_t max_depth = 8;  // a number of a transform is at 5
-
-/// Reads a text without keeping anything: what is wrong with it, keys that stand twice and deep nesting included, which
-/// the library's own document would pass over.
-class TextCheck : public nlohmann::json_sax<json> {
-public:
-    const std::string& complaint() const { return complaint_; }
-
-    bool null() override { return true; }
-    bool boolean(bool) override { return true; }
-    bool number_integer(number_integer_t) override { return true; }
-    bool number_unsigned(number_unsigned_t) override { return true; }
-    bool number_float(number_float_t, const string_t&) override { return true; }
-    bool string(string_t&) override { return true; }
-    bool binary(binary_t&) override { return true; }
-    bool start_object(size_t) override { return open(); }
-    bool end_object() override { return close(); }
-    bool start_array(size_t) override { return open(); }
-    bool end_array() override { return close(); }
-    bool key(string_t& name) override {
-        if (keys_.back().insert(name).second) return true;
-        complaint_ = fmt::format("the key '{}' stands twice in one object", name);
-        return false;
-    }
-    bool parse_error(size_t byte, const std::string&, const nlohmann::detail::exception& error) override {
-        // Its message repeats the place, and names the library's own rules.
-        complaint_ =
-            fmt::format("the text is no JSON from byte {} on: {}", byte, std::string_view(error.what()).substr(0, 200));
-        return false;
-    }
-
-private:
-    bool open() {
-        keys_.emplace_back();
-        if (keys_.size() <= max_depth) return true;
-        complaint_ = fmt::format("values are nested more than {} deep", max_depth);
-        return false;
-    }
-    bool close() {
-        keys_.pop_back();
-        return true;
-    }
-
-    std::vector<std::set<std::string>> keys_;  // of the objects and arrays around
-    std::string complaint_;
-};
 
 /// Reads a document; the first thing that is wrong with it is kept, and what follows it is read as nothing.
 class SceneReading {
@@ -92,9 +48,9 @@ private:
     }
 
     json parse(std::string_view text) {
-        TextCheck check;
-        if (json::sax_parse(text.begin(), text.end(), &check)) return json::parse(text.begin(), text.end());
-        fail("", "scene.json", "{}", check.complaint());
+        const std::string complaint = detail::checkJson(text, max_depth);
+        if (complaint.empty()) return json::parse(text.begin(), text.end());
+        fail("", "scene.json", "{}", complaint);
         return json::object();
     }
 

@@ -73,7 +73,7 @@ public:
         for (size_t i = 0; i < samples.size(); i++) {
             const Vector3f color = options_.color ? options_.color(samples[i].position) : Vector3f(0.6f);
             if (!(color.x >= 0 && color.y >= 0 && color.z >= 0 && color.x <= 1 && color.y <= 1 && color.z <= 1))
-                return makeError(ErrorCode::OutOfRange, "splats.option",
+                return makeError(ErrorCode::OutOfRange, "splats.from_mesh",
                                  "splats of a mesh: the color ({}, {}, {}) at ({}, {}, {}) is not within 0 and 1",
                                  color.x, color.y, color.z, samples[i].position.x, samples[i].position.y,
                                  samples[i].position.z);
@@ -220,7 +220,7 @@ private:
 
 Status checkOptions(const MeshSplatsOptions& options) {
     const auto fail = [](const char* what, auto value, const char* range) {
-        return makeError(ErrorCode::OutOfRange, "splats.option", "splats of a mesh: {} {}; {}", what, value, range);
+        return makeError(ErrorCode::OutOfRange, "splats.from_mesh", "splats of a mesh: {} {}; {}", what, value, range);
     };
     const SplatLight& light = options.light;
     if (options.degree > Splats::max_degree) return fail("degree", options.degree, "0 to 3 are known");
@@ -234,7 +234,7 @@ Status checkOptions(const MeshSplatsOptions& options) {
         return fail("number of rays to the sky", options.sky_rays, "1 to 1024 can be cast");
     const auto checkVector = [](const char* what, const Vector3f& v, bool is_valid) -> Status {
         if (is_valid) return {};
-        return makeError(ErrorCode::OutOfRange, "splats.option", "splats of a mesh: the light's {} is ({}, {}, {})",
+        return makeError(ErrorCode::OutOfRange, "splats.from_mesh", "splats of a mesh: the light's {} is ({}, {}, {})",
                          what, v.x, v.y, v.z);
     };
     for (const auto& [what, v] : {std::pair("up", light.up), std::pair("direction", light.direction)}) {

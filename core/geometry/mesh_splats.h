@@ -57,7 +57,7 @@ struct MeshSplatsOptions {
 ///
 /// Empty: nothing is in the way of any light. Takes 25 microseconds a splat beside the rays, and 1 kB.
 ///
-/// Errors: those of sampleSurface, "splats.option" (a value out of its range, or not finite, a color outside of
+/// Errors: those of sampleSurface, "splats.from_mesh" (a value out of its range, or not finite, a color outside of
 /// 0 to 1), "splats.occlusion" (not as many answers as rays); those of `occlusion`.
 Expected<Splats> splatsFromMesh(const Mesh& mesh, const MeshSplatsOptions& options = {},
                                 const OcclusionTest& occlusion = {});

@@ -204,7 +204,7 @@ TEST(MeshSplats, PassErrorsOn) {
     const auto expectRefused = [&](auto&& change) {
         MeshSplatsOptions changed = options;
         change(changed);
-        EXPECT_THAT(splatsFromMesh(mesh, changed), HasErrorId("splats.option"));
+        EXPECT_THAT(splatsFromMesh(mesh, changed), HasErrorId("splats.from_mesh"));
     };
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     expectRefused([](MeshSplatsOptions& o) { o.degree = 4; });

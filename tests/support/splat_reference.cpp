@@ -309,17 +309,6 @@ SplatPicture renderSplats(const Camera& camera, uint32_t width, uint32_t height,
     return picture;
 }
 
-SplatPicture toSplatPicture(const Image& image) {
-    SplatPicture picture = {image.width(), image.height(), {}, {}, {}};
-    for (uint32_t y = 0; y < image.height(); y++)
-        for (uint32_t x = 0; x < image.width(); x++) {
-            const Vector4d texel(image.load(x, y));
-            picture.color.emplace_back(texel);
-            picture.transmittance.push_back(1.0 - texel.w);
-        }
-    return picture;
-}
-
 double PictureError::psnr() const { return rmse > 0.0 ? -20.0 * std::log10(rmse) : 999.0; }
 
 PictureError comparePictures(const SplatPicture& actual, const SplatPicture& expected) {

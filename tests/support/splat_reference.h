@@ -2,7 +2,6 @@
 
 // Pictures of Gaussian splats in float64: what the renderer's model says, with and without what a renderer leaves out.
 
-#include <glint/format/image.h>
 #include <glint/format/splats.h>
 #include <glint/math/camera.h>
 
@@ -76,9 +75,6 @@ struct SplatPicture {
 /// end at a transmittance of 1e-12 / 4, which bounds all that is behind.
 SplatPicture renderSplats(const Camera& camera, uint32_t width, uint32_t height,
                           std::span<const SplatInstance> instances, const SplatSettings& settings = {});
-
-/// The colors of a picture read back from a device; transmittance is 1 - alpha, depth is empty.
-SplatPicture toSplatPicture(const Image& image);
 
 /// How much two pictures' colors differ, over all channels of all pixels.
 struct PictureError {

@@ -39,7 +39,7 @@ float between(Random& random, double low, double high) { return static_cast<floa
 const Vector4f unturned = {0, 0, 0, 1};
 
 /// Cameras of the scenes below are at the origin and look along +Y, with Z up: a place is (right, depth, up).
-SplatScene frontal(const char* name, uint32_t width, uint32_t height, float fov = 60.0f) {
+SplatScene frontal(const std::string& name, uint32_t width, uint32_t height, float fov = 60.0f) {
     SplatScene scene = {name, {}, {}, width, height};
     scene.camera.lookAt({0, 0, 0}, {0, 1, 0})
         .perspective(fov, static_cast<float>(width) / static_cast<float>(height), 0.1f);
@@ -143,21 +143,6 @@ SplatScene besideScene() {
     return scene;
 }
 
-SplatScene fovScene(const char* name, float fov) {
-    SplatScene scene = frontal(name, 96, 72, fov);
-    Random random(19);
-    const double tangent = std::tan(fov * glm::pi<double>() / 360.0);
-    for (int i = 0; i < 500; i++) {
-        const double z = random.uniform(1.0, 4.0);
-        const auto size = [&] { return static_cast<float>(random.uniform(0.01, 0.2) * z * std::min(tangent, 1.0)); };
-        addSplat(scene.splats,
-                 {static_cast<float>(random.uniform(-1.4, 1.4) * z * tangent), static_cast<float>(z),
-                  static_cast<float>(random.uniform(-1.1, 1.1) * z * tangent)},
-                 {size(), size(), size()}, anyRotation(random), between(random, 0.1, 1), anyColor(random));
-    }
-    return scene;
-}
-
 }  // namespace
 
 void addSplat(Splats& splats, const Vector3f& position, const Vector3f& scales, const Vector4f& rotation, float opacity,
@@ -242,6 +227,21 @@ SplatScene needleScene(uint32_t count, float sigma, uint32_t width, uint32_t hei
     return scene;
 }
 
+SplatScene spreadScene(const std::string& name, uint32_t count, float fov, uint32_t width, uint32_t height) {
+    SplatScene scene = frontal(name, width, height, fov);
+    Random random(19);
+    const double tangent = std::tan(fov * glm::pi<double>() / 360.0);
+    for (uint32_t i = 0; i < count; i++) {
+        const double z = random.uniform(1.0, 4.0);
+        const auto size = [&] { return static_cast<float>(random.uniform(0.01, 0.2) * z * std::min(tangent, 1.0)); };
+        addSplat(scene.splats,
+                 {static_cast<float>(random.uniform(-1.1, 1.1) * z * tangent * width / height), static_cast<float>(z),
+                  static_cast<float>(random.uniform(-1.1, 1.1) * z * tangent)},
+                 {size(), size(), size()}, anyRotation(random), between(random, 0.1, 1), anyColor(random));
+    }
+    return scene;
+}
+
 SplatScene crowdScene(uint32_t count, float opacity) {
     SplatScene scene = frontal("crowd", 64, 64);
     Random random(23);
@@ -271,8 +271,8 @@ std::vector<SplatScene> hardSplatScenes() {
     scenes.push_back(flatScene());
     scenes.push_back(hugeScene());
     scenes.push_back(besideScene());
-    scenes.push_back(fovScene("wide", 170.0f));
-    scenes.push_back(fovScene("narrow", 1.0f));
+    scenes.push_back(spreadScene("wide", 500, 170.0f, 96, 72));
+    scenes.push_back(spreadScene("narrow", 500, 1.0f, 96, 72));
     return scenes;
 }
 

@@ -46,11 +46,14 @@ SplatScene surfaceScene(uint32_t count, uint32_t degree, uint32_t width, uint32_
 /// Needles, 2 * `sigma` pixels long and 0.2 wide, through the middle of the picture at `count` angles.
 SplatScene needleScene(uint32_t count, float sigma, uint32_t width, uint32_t height);
 
+/// Splats all over the picture and a little beyond, whatever its size and field of view.
+SplatScene spreadScene(const std::string& name, uint32_t count, float fov, uint32_t width, uint32_t height);
+
 /// `count` small splats of random colors within 16 x 16 pixels that are one tile, and a few around.
 SplatScene crowdScene(uint32_t count, float opacity);
 
-/// What is hard in some way. Names: needles, crowd, inside, near, opacity, equal_depths, faint, flat, huge, beside,
-/// wide, narrow.
+/// What is hard in some way; colors are at most 1. Names: needles, crowd, inside, near, opacity, equal_depths, faint,
+/// flat, huge, beside, wide, narrow.
 std::vector<SplatScene> hardSplatScenes();
 
 }  // namespace glint::test

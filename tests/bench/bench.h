@@ -78,6 +78,9 @@ Benchmark tracingTradeoffsBenchmark();
 Benchmark traversalOffsetBenchmark();
 Benchmark traversalHelloBenchmark();
 Benchmark parallelBenchmark();
+Benchmark splatAccuracyBenchmark();
+Benchmark splatTradeoffsBenchmark();
+Benchmark splatNeedlesBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

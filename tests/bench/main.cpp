@@ -55,7 +55,8 @@ int main(int argc, char** argv) {
         tracingFrameBenchmark(),     startupBenchmark(),         memoryBenchmark(),       tracingSoftwareBenchmark(),
         tracingBuildBenchmark(),     tracingDeviceBenchmark(),   tracingLeaksBenchmark(), tracingDriverBenchmark(),
         tracingTradeoffsBenchmark(), tracingGpuBenchmark(),      castBenchmark(),         castMemoryBenchmark(),
-        traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark()};
+        traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),     splatAccuracyBenchmark(),
+        splatTradeoffsBenchmark(),   splatNeedlesBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

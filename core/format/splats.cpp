@@ -78,4 +78,14 @@ Status Splats::validate() const {
     return {};
 }
 
+void Splats::reduceDegree(uint32_t to) {
+    if (to >= degree) return;
+    const size_t from_count = coefficientCount();
+    degree = to;
+    const size_t count = coefficientCount();
+    for (size_t i = 1; i < size(); i++)
+        std::copy_n(harmonics.data() + i * from_count, count, harmonics.data() + i * count);
+    harmonics.resize(size() * count);
+}
+
 }  // namespace glint

@@ -74,6 +74,10 @@ struct Splats {
     /// not within 1e-3 of 1), each with the splat's number.
     Status validate() const;
 
+    /// Leaves out the harmonics above a degree. Each degree is orthogonal to the others, so what is left is the nearest
+    /// that the lower degree can come to the colors, in the mean over all directions and before they are cut off at 0.
+    void reduceDegree(uint32_t to);
+
     /// The box of the centres.
     BoundBox bounds() const { return BoundBox(positions); }
 

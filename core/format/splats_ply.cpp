@@ -144,8 +144,8 @@ Expected<Splats> parsePlySplats(std::span<const std::byte> file, const std::stri
     std::vector<float> values(columns->vertices->count * width);
     std::vector<PlyReader::Column> places;
     rows = {.begin = 0, .stride = static_cast<uint32_t>(width * sizeof(float)), .offsets = {}};
-    for (size_t i = 0; i < width; i++) {
-        places.push_back({columns->properties[i], values.data() + i, width});
+    for (size_t i = 0; i < width && !values.empty(); i++) {
+        places.push_back({columns->properties[i], &values[i], width});
         rows.offsets.push_back(static_cast<uint32_t>(i * sizeof(float)));
     }
     if (Status status = reader.readColumns(*columns->vertices, places); !status) return unexpected(status.error());

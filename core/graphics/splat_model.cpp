@@ -112,6 +112,10 @@ uint64_t SplatModel::getMemory() const {
     return bytes;
 }
 
+uint32_t SplatModel::splatSize(uint32_t degree, Storage storage) {
+    return wordsOf((degree + 1) * (degree + 1), storage) * 4;
+}
+
 Splats SplatModel::decoded(const Splats& splats, Storage storage) {
     Splats result = splats;
     for (Vector4f& rotation : result.rotations) {

@@ -61,6 +61,8 @@ public:
     const BoundBox& getBounds() const { return bounds_; }
     std::span<const Chunk> getChunks() const { return chunks_; }
 
+    /// Bytes of a splat on a device.
+    static uint32_t splatSize(uint32_t degree, Storage storage);
     /// What the storage holds of splats that are valid: each value as the device decodes it. Quaternions become of
     /// length 1; StorageHalf rounds their components to the nearest multiple of 1/32767 before, and harmonics to the
     /// nearest float16, at most 65504.

@@ -417,3 +417,20 @@ TEST(Spz, LimitsAndLies) {
     const SpzSplat lie{.degree = 3, .count = 50'000'000};
     EXPECT_LT(peakMemory([&] { EXPECT_THAT(lie.read(), HasErrorId("splats.truncated")); }), uint64_t{1} << 20);
 }
+
+TEST(Splats, ReducedDegree) {
+    const Splats splats = randomSplats(50, 3, 1);
+    for (uint32_t degree = 0; degree <= 3; degree++) {
+        Splats reduced = splats;
+        reduced.reduceDegree(degree);
+        EXPECT_EQ(reduced.degree, degree);
+        EXPECT_THAT(reduced.validate(), IsOk());
+        const size_t count = reduced.coefficientCount();
+        for (size_t i = 0; i < splats.size(); i++)
+            for (size_t k = 0; k < count; k++)
+                EXPECT_EQ(reduced.harmonics[i * count + k], splats.harmonics[i * 16 + k]);
+        Splats again = reduced;
+        again.reduceDegree(3);
+        EXPECT_EQ(again, reduced);
+    }
+}

@@ -78,6 +78,7 @@ Benchmark tracingTradeoffsBenchmark();
 Benchmark traversalOffsetBenchmark();
 Benchmark traversalHelloBenchmark();
 Benchmark parallelBenchmark();
+Benchmark splatLoadBenchmark();
 Benchmark splatAccuracyBenchmark();
 Benchmark splatTradeoffsBenchmark();
 Benchmark splatNeedlesBenchmark();

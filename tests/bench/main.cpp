@@ -56,7 +56,7 @@ int main(int argc, char** argv) {
         tracingBuildBenchmark(),     tracingDeviceBenchmark(),   tracingLeaksBenchmark(), tracingDriverBenchmark(),
         tracingTradeoffsBenchmark(), tracingGpuBenchmark(),      castBenchmark(),         castMemoryBenchmark(),
         traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),     splatAccuracyBenchmark(),
-        splatTradeoffsBenchmark(),   splatNeedlesBenchmark()};
+        splatLoadBenchmark(),        splatTradeoffsBenchmark(),  splatNeedlesBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

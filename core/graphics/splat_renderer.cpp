@@ -36,8 +36,9 @@ struct Frame {
     float low_pass = 0.0f;
     float near = 0.0f;
     uint32_t first_depth = 0;
+    uint32_t last_key = 0;
     uint32_t antialiased = 0;
-    uint32_t reserved[2] = {};
+    uint32_t reserved = 0;
 };
 static_assert(sizeof(Frame) == 64);
 
@@ -76,6 +77,9 @@ Status checkOptions(const SplatRenderer::Options& options) {
         return makeError(ErrorCode::OutOfRange, "splats.options", "splat renderer: {} is {}, it has to be {}", what,
                          value, range);
     };
+    if (options.threads != 0 &&
+        !(std::has_single_bit(options.threads) && options.threads >= 8 && options.threads <= 256))
+        return fail("threads", options.threads, "a power of two from 8 to 256");
     // The negated comparisons refuse NaN.
     if (options.tile_width != 0 || options.tile_height != 0) {
         if (!isTile(options.tile_width)) return fail("tile_width", options.tile_width, "8, 16, 32 or 64");
@@ -91,14 +95,47 @@ Status checkOptions(const SplatRenderer::Options& options) {
     return {};
 }
 
+/// The range of the bits of view depths, from the boxes of the centres, wider than the rounding of the depths: so that
+/// sorts need no more bits than there are.
+void setDepths(Frame& frame, float near, const Camera& camera, std::span<const SplatRenderer::Instance> instances) {
+    double least = std::numeric_limits<double>::infinity(), most = near;
+    for (const SplatRenderer::Instance& instance : instances) {
+        if (instance.model.size() == 0) continue;
+        const Matrix4x4d matrix = Matrix4x4d(camera.view()) * Matrix4x4d(instance.transform);
+        const BoundBox& box = instance.model.getBounds();
+        double low = -matrix[3][2], high = low, magnitude = std::abs(low);
+        for (int axis = 0; axis < 3; axis++) {
+            const double a = -matrix[axis][2] * box.min[axis], b = -matrix[axis][2] * box.max[axis];
+            low += std::min(a, b);
+            high += std::max(a, b);
+            magnitude += std::max(std::abs(a), std::abs(b));
+        }
+        least = std::min(least, low - 1e-5 * magnitude);
+        most = std::max(most, high + 1e-5 * magnitude);
+    }
+    const float largest = std::numeric_limits<float>::max();
+    const auto bitsOf = [&](double depth) {
+        return std::bit_cast<uint32_t>(static_cast<float>(std::clamp<double>(depth, near, largest)));
+    };
+    frame.first_depth = bitsOf(std::min(least, most));
+    frame.last_key = bitsOf(most) - frame.first_depth;
+}
+
+/// At least `groups` groups, in two dimensions where one has too few.
+void dispatchGroups(Compute& compute, const Kernel& kernel, uint32_t groups, SplatRenderer::Where where) {
+    constexpr uint32_t row = 32768;
+    compute.dispatch(uint64_t{std::min(groups, row)} * kernel.getGroupSizeX(), divideUp(groups, row), 1, where);
+}
+
 }  // namespace
 
 struct SplatRenderer::State {
     Device device;
     Options options;
     bool is_cpu = false;
-    uint32_t group = 0;        ///< threads of a group of the passes that share sums
-    uint32_t blend_group = 0;  ///< threads of a tile
+    bool is_wide = false;     ///< the forms for GPUs
+    uint32_t group = 0;       ///< threads of the passes that share sums
+    uint32_t scan_group = 0;  ///< of the group that sums up the others
     std::map<std::string, Kernel, std::less<>> kernels;
 
     uint32_t room = 0;      ///< splats
@@ -132,11 +169,19 @@ Status SplatRenderer::State::create(Where where) {
         options.tile_height = 16;
     }
     options.max_degree = std::min(options.max_degree, Splats::max_degree);
-    // On CPUs a barrier costs for each subgroup.
-    group = is_cpu ? 8 : std::min(block, features.maxGroupThreads);
     const uint32_t pixels = options.tile_width * options.tile_height;
-    blend_group = options.method == MethodPlain ? std::min(pixels, 256u) : is_cpu ? 8 : std::max(pixels / 8, 32u);
-    blend_group = std::min({blend_group, pixels, features.maxGroupThreads});
+    if (options.threads == 0)
+        options.threads =
+            options.method == MethodPlain ? std::min(pixels, 256u) : std::max(pixels / 64, is_cpu ? 8u : 32u);
+    if (options.threads > std::min(pixels, features.maxGroupThreads) || options.threads < pixels / 64)
+        return makeError(where, ErrorCode::OutOfRange, "splats.options",
+                         "splat renderer: {} threads for the {} pixels of a tile; there have to be {} to {}",
+                         options.threads, pixels, std::max(pixels / 64, 8u),
+                         std::min({pixels, features.maxGroupThreads, 256u}));
+    // On CPUs a barrier costs for each subgroup.
+    is_wide = options.method == MethodTiles ? options.threads >= 32 : !is_cpu;
+    group = is_wide ? block : 8;
+    scan_group = is_wide ? std::min(std::bit_floor(features.maxGroupThreads), 1024u) : 8;
     if (options.timed) {
         if (!features.has(FeatureTimestamps))
             return makeError(where, ErrorCode::Unsupported, "device.unsupported", "{} lacks {}", device.getInfo().name,
@@ -256,7 +301,7 @@ Status SplatRenderer::State::record(Compute& compute, const Camera& camera, std:
     frame.capacity = capacity;
     frame.low_pass = options.low_pass;
     frame.near = options.near;
-    frame.first_depth = std::bit_cast<uint32_t>(options.near);
+    setDepths(frame, options.near, camera, instances);
     frame.antialiased = options.antialiased ? 1 : 0;
 
     const auto pass = [&](Pass which, auto&& play) {
@@ -273,12 +318,6 @@ Status SplatRenderer::State::record(Compute& compute, const Camera& camera, std:
     if (status) status = pass(PassGather, [&] { return gather(compute, frame, where); });
     if (status) status = pass(PassBlend, [&] { return blend(compute, frame, outputs, where); });
     return status;
-}
-
-/// At least `groups` groups, in two dimensions where one has too few.
-void dispatchGroups(Compute& compute, const Kernel& kernel, uint32_t groups, SplatRenderer::Where where) {
-    constexpr uint32_t row = 32768;
-    compute.dispatch(uint64_t{std::min(groups, row)} * kernel.getGroupSizeX(), divideUp(groups, row), 1, where);
 }
 
 Status SplatRenderer::State::project(Compute& compute, const Camera& camera, std::span<const Instance> instances,
@@ -329,22 +368,24 @@ Status SplatRenderer::State::sort(Compute& compute, const Frame& frame, Where wh
         return {};
     };
     if (Status status = select(0); !status) return status;
-    const Expected<Kernel> scan = kernel("scan", fmt::format("GLINT_GROUP={}; GLINT_STAGE=0", group), where);
+    const Expected<Kernel> scan = kernel("scan", fmt::format("GLINT_GROUP={}; GLINT_STAGE=0", scan_group), where);
     if (!scan) return scan.error();
     compute.setKernel(*scan);
     compute.setUniform(0, frame);
     compute.setStorageBuffers(0, {sums, state});
     compute.setPushConstants(blocks, where);
-    compute.dispatch(group, 1, 1, where);
+    compute.dispatch(scan_group, 1, 1, where);
     if (Status status = select(1); !status) return status;
-    splat_sort.dispatchIndirect(compute, keys, state, offsetof(DeviceState, splats), 32, where);
+    const auto bits = static_cast<uint32_t>(std::bit_width(std::max(frame.last_key, 1u)));
+    splat_sort.dispatchIndirect(compute, keys, state, offsetof(DeviceState, splats), bits, where);
     return {};
 }
 
 Status SplatRenderer::State::scatter(Compute& compute, const Frame& frame, Where where) {
     const auto play = [&](uint32_t stage) -> Status {
-        const Expected<Kernel> kernel =
-            this->kernel("scatter", fmt::format("GLINT_GROUP={}; GLINT_STAGE={}", group, stage), where);
+        const Expected<Kernel> kernel = this->kernel(
+            "scatter", fmt::format("GLINT_GROUP={}; GLINT_STAGE={}; GLINT_WIDE={}", group, stage, is_wide ? 1 : 0),
+            where);
         if (!kernel) return kernel.error();
         compute.setKernel(*kernel);
         compute.setUniform(0, frame);
@@ -354,13 +395,13 @@ Status SplatRenderer::State::scatter(Compute& compute, const Frame& frame, Where
         return {};
     };
     if (Status status = play(0); !status) return status;
-    const Expected<Kernel> scan = kernel("scan", fmt::format("GLINT_GROUP={}; GLINT_STAGE=1", group), where);
+    const Expected<Kernel> scan = kernel("scan", fmt::format("GLINT_GROUP={}; GLINT_STAGE=1", scan_group), where);
     if (!scan) return scan.error();
     compute.setKernel(*scan);
     compute.setUniform(0, frame);
     compute.setStorageBuffers(0, {sums, state});
     compute.setPushConstants(uint32_t{0}, where);
-    compute.dispatch(group, 1, 1, where);
+    compute.dispatch(scan_group, 1, 1, where);
     return play(1);
 }
 
@@ -380,12 +421,14 @@ Status SplatRenderer::State::gather(Compute& compute, const Frame& frame, Where 
 
 Status SplatRenderer::State::blend(Compute& compute, const Frame& frame, const Outputs& outputs, Where where) {
     const bool has_depth = static_cast<bool>(outputs.depth), has_rest = static_cast<bool>(outputs.transmittance);
-    const uint32_t columns = std::max(options.tile_width / blend_group, 1u);
-    const uint32_t rows = options.tile_width * options.tile_height / blend_group / columns;
+    const bool is_shared = is_wide && options.method == MethodTiles;
+    const uint32_t columns = std::max(options.tile_width / options.threads, 1u);
+    const uint32_t rows = options.tile_width * options.tile_height / options.threads / columns;
     const Expected<Kernel> kernel = this->kernel(
         "blend",
-        fmt::format("GLINT_GROUP={}; GLINT_COLUMNS={}; GLINT_ROWS={}; GLINT_DEPTH={}; GLINT_TRANSMITTANCE={}",
-                    blend_group, columns, rows, has_depth ? 1 : 0, has_rest ? 1 : 0),
+        fmt::format("GLINT_GROUP={}; GLINT_COLUMNS={}; GLINT_ROWS={}; GLINT_SHARED={}; GLINT_DEPTH={}; "
+                    "GLINT_TRANSMITTANCE={}",
+                    options.threads, columns, rows, is_shared ? 1 : 0, has_depth ? 1 : 0, has_rest ? 1 : 0),
         where);
     if (!kernel) return kernel.error();
     compute.setKernel(*kernel);

@@ -12,9 +12,10 @@ layout(std140, set = 0, binding = 0) uniform Frame {
     uint capacity;    // entries of the tiles' lists
     float low_pass;   // pixels^2
     float near;
-    uint first_depth;  // least sort key
+    uint first_depth;  // bits of the least view depth
+    uint last_key;     // sort keys of depths are from 0 to it
     uint antialiased;
-    uint reserved_0, reserved_1;
+    uint reserved;
 } frame;
 
 // A splat on the picture, 32 bytes. Coordinates are relative to the picture's middle, so that their rounding is

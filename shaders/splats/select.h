@@ -31,7 +31,7 @@ void main() {
     for (uint i = begin; i < end; i++) {
         const uvec2 info = infos[i];
         if (info.y == 0u) continue;
-        keys[place] = info.x - frame.first_depth;
+        keys[place] = min(max(info.x, frame.first_depth) - frame.first_depth, frame.last_key);
         keys[frame.room + place] = i;
         place++;
     }

@@ -62,6 +62,12 @@ TEST_F(SplatAccuracyTest, Surfaces) {
     for (const uint32_t degree : {0u, 1u, 2u, 3u}) expectAccurate(drawer, surfaceScene(4000, degree, 96, 64));
 }
 
+TEST_F(SplatAccuracyTest, AMesh) {
+    GLINT_NEED_FEATURE(FeatureComputeTracing);
+    SplatDrawer drawer(device);
+    expectAccurate(drawer, meshScene(device, 6000, 4, 128, 96));
+}
+
 TEST_F(SplatAccuracyTest, HardCases) {
     SplatDrawer drawer(device);
     for (const SplatScene& scene : hardSplatScenes()) expectAccurate(drawer, scene);
@@ -167,9 +173,7 @@ TEST_F(SplatAccuracyTest, TheStopChangesNoPixelByMore) {
             // Colors are at most 1. The same sums up to where they end, so rounding adds next to nothing.
             const double largest = comparePictures(picture, all[i]).largest;
             EXPECT_LE(largest, static_cast<double>(stop) * (1.0 + 1e-5));
-            if (stop > 0.01f) {
-                EXPECT_GT(largest, static_cast<double>(stop) * 0.1);
-            }
+            if (stop > 0.01f) { EXPECT_GT(largest, static_cast<double>(stop) * 0.1); }
         }
     }
 }

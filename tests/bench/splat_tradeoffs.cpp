@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <memory>
 
 namespace glint::bench {
@@ -22,46 +23,38 @@ using test::SplatScene;
 
 /// One way to draw a scene.
 struct Trial {
-    std::string label;
     double value = 0.0;
     SplatRenderer::Options options;
-    double time = 0.0;  ///< of a picture, over that of the first trial
+    double time = 0.0;  ///< of a picture, over that of the default
     double rmse = 0.0;
 };
 
-/// Fills in times and errors. Best times of drawers that take turns, in processor time, which does not depend on what
-/// else runs; the first turn, when kernels are compiled, does not count.
-void drawAll(const Device& device, const SplatScene& scene, const SplatModel& model, const SplatPicture& truth,
-             std::vector<Trial>& trials) {
-    std::vector<std::unique_ptr<SplatDrawer>> drawers;
-    for (Trial& trial : trials) {
-        drawers.push_back(std::make_unique<SplatDrawer>(device, trial.options));
-        drawers.back()->draw(scene, model);
-        trial.rmse = test::comparePictures(drawers.back()->picture(), truth).rmse;
-        trial.time = INFINITY;
-    }
-    for (uint32_t turn = 0; turn < 7; turn++)
-        for (size_t i = 0; i < trials.size(); i++) {
+/// Best processor times of drawers that take turns, which do not depend on what else runs.
+std::vector<double> bestTimes(std::span<const std::function<void()>> draws) {
+    std::vector<double> best(draws.size(), INFINITY);
+    for (uint32_t turn = 0; turn < 15; turn++)
+        for (size_t i = 0; i < draws.size(); i++) {
             const double begin = processSeconds();
-            drawers[i]->draw(scene, model);
-            trials[i].time = std::min(trials[i].time, processSeconds() - begin);
+            draws[i]();
+            best[i] = std::min(best[i], processSeconds() - begin);
         }
-    const double first = trials[0].time;
-    for (Trial& trial : trials) trial.time /= first;
+    return best;
 }
 
-/// The first trial is the default, at the value that is among the others'.
-void write(Report& report, const std::string& name, const std::string& header, const std::vector<Trial>& trials,
-           std::string& table) {
-    std::string curve = fmt::format("# {}, time over the default's, rmse\n", header);
-    for (size_t i = 1; i < trials.size(); i++) {
-        const Trial& trial = trials[i];
-        curve += fmt::format("{:.6e} {:.4f} {:.4e}\n", trial.value, trial.time, trial.rmse);
-        const std::string label = trial.value == trials[0].value ? "**" + trial.label + "**" : trial.label;
-        table += fmt::format("| {} | {} | {:.3f} | {:.1e} |\n", name.substr(name.find('_') + 1), label, trial.time,
-                             trial.rmse);
+/// Fills in times and errors.
+void drawAll(const Device& device, const SplatScene& scene, const SplatModel& model, const SplatPicture& truth,
+             std::span<Trial> trials, size_t default_trial) {
+    std::vector<std::unique_ptr<SplatDrawer>> drawers;
+    std::vector<std::function<void()>> draws;
+    for (Trial& trial : trials) {
+        drawers.push_back(std::make_unique<SplatDrawer>(device, trial.options));
+        SplatDrawer& drawer = *drawers.back();
+        drawer.draw(scene, model);
+        trial.rmse = test::comparePictures(drawer.picture(), truth).rmse;
+        draws.push_back([&] { drawer.draw(scene, model); });
     }
-    check(writeTextFile(report.folder() / ("splat_" + name + ".dat"), curve));
+    const std::vector<double> times = bestTimes(draws);
+    for (size_t i = 0; i < trials.size(); i++) trials[i].time = times[i] / times[default_trial];
 }
 
 std::string fraction(double value) {
@@ -69,64 +62,73 @@ std::string fraction(double value) {
     return value > 1e-3 ? fmt::format("1/{:.0f}", inverse) : fmt::format("{:.0e}", value);
 }
 
-void compareCutOffs(Report& report, const Device& device, std::span<const SplatScene> scenes) {
-    std::string stops = fmt::format("{}; 480 x 270 pixels.\n\n| scene | transmittance stop | time | rmse |\n"
-                                    "|---|---|---|---|\n",
-                                    deviceName(device));
-    std::string cuts = fmt::format("{}; 480 x 270 pixels.\n\n| scene | alpha cut | time | rmse |\n|---|---|---|---|\n",
-                                   deviceName(device));
+/// Draws with all values of one cut-off. The error is that of this one: the truth leaves out what the other does.
+void compareCutOff(Report& report, const Device& device, std::span<const SplatScene> scenes, const std::string& name,
+                   float SplatRenderer::Options::*option, float test::SplatSettings::*setting,
+                   std::span<const float> values) {
+    std::string table = fmt::format("{}; 480 x 270 pixels.\n\n| scene | {} | time | rmse |\n|---|---|---|---|\n",
+                                    deviceName(device), name);
     const SplatRenderer::Options defaults;
     for (const SplatScene& scene : scenes) {
+        test::SplatSettings settings = test::settingsOf(defaults);
+        settings.*setting = 0.0f;
+        std::vector<Trial> trials;
+        for (const float value : values) {
+            trials.push_back({static_cast<double>(value), defaults});
+            trials.back().options.*option = value;
+        }
+        const auto chosen = std::find(values.begin(), values.end(), defaults.*option) - values.begin();
         const SplatModel model(device, scene.splats, SplatModel::StorageFloat);
-        const SplatPicture truth = test::referenceOf(scene, {});
-        std::vector<Trial> trials = {{"", static_cast<double>(defaults.transmittance_stop), defaults}};
-        for (const float stop : {1e-6f, 1e-5f, 1e-4f, 1e-3f, 1.0f / 255.0f, 1.0f / 64.0f, 1.0f / 16.0f, 0.25f}) {
-            trials.push_back({fraction(static_cast<double>(stop)), static_cast<double>(stop), defaults});
-            trials.back().options.transmittance_stop = stop;
+        drawAll(device, scene, model, test::referenceOf(scene, settings), trials, static_cast<size_t>(chosen));
+        std::string curve = fmt::format("# {}, time over the default's, rmse\n", name);
+        for (const Trial& trial : trials) {
+            curve += fmt::format("{:.6e} {:.4f} {:.4e}\n", trial.value, trial.time, trial.rmse);
+            const char* mark = &trial - trials.data() == chosen ? "**" : "";
+            table += fmt::format("| {} | {}{}{} | {:.3f} | {:.1e} |\n", scene.name, mark, fraction(trial.value), mark,
+                                 trial.time, trial.rmse);
         }
-        drawAll(device, scene, model, truth, trials);
-        write(report, "stop_" + scene.name, "stop", trials, stops);
-
-        trials = {{"", static_cast<double>(defaults.alpha_cut), defaults}};
-        for (const float cut : {1e-5f, 1e-4f, 1.0f / 2048.0f, 1.0f / 1024.0f, 1.0f / 512.0f, 1.0f / 255.0f,
-                                1.0f / 128.0f, 1.0f / 64.0f, 1.0f / 32.0f, 1.0f / 16.0f}) {
-            trials.push_back({fraction(static_cast<double>(cut)), static_cast<double>(cut), defaults});
-            trials.back().options.alpha_cut = cut;
-        }
-        drawAll(device, scene, model, truth, trials);
-        write(report, "cut_" + scene.name, "cut", trials, cuts);
+        check(writeTextFile(report.folder() / fmt::format("splat_{}_{}.dat", name, scene.name), curve));
     }
-    fmt::print("{}\n{}\n", stops, cuts);
-    check(writeTextFile(report.folder() / "splat_stops.md", stops));
-    check(writeTextFile(report.folder() / "splat_cuts.md", cuts));
+    fmt::print("{}\n", table);
+    check(writeTextFile(report.folder() / fmt::format("splat_{}.md", name), table));
+}
+
+void compareCutOffs(Report& report, const Device& device, std::span<const SplatScene> scenes) {
+    constexpr float stops[] = {1e-6f, 1e-5f, 1e-4f, 1e-3f, 1.0f / 255.0f, 1.0f / 64.0f, 1.0f / 16.0f, 0.25f};
+    compareCutOff(report, device, scenes, "stop", &SplatRenderer::Options::transmittance_stop,
+                  &test::SplatSettings::transmittance_stop, stops);
+    constexpr float cuts[] = {1e-5f,         1e-4f,         1.0f / 2048.0f, 1.0f / 1024.0f, 1.0f / 512.0f,
+                              1.0f / 255.0f, 1.0f / 128.0f, 1.0f / 64.0f,   1.0f / 32.0f,   1.0f / 16.0f};
+    compareCutOff(report, device, scenes, "cut", &SplatRenderer::Options::alpha_cut, &test::SplatSettings::alpha_cut,
+                  cuts);
 }
 
 void compareTiles(Report& report, const Device& device, std::span<const SplatScene> scenes) {
-    constexpr uint32_t sizes[] = {8, 16, 32, 64};
+    constexpr uint32_t sizes[] = {8, 16, 32};
     std::string table = fmt::format("{}; 480 x 270 pixels; times over that of the default.\n\n"
-                                    "| scene | height | width 8 | 16 | 32 | 64 |\n|---|---|---|---|---|---|\n",
+                                    "| scene | height | width 8 | 16 | 32 |\n|---|---|---|---|---|\n",
                                     deviceName(device));
     for (const SplatScene& scene : scenes) {
         const SplatModel model(device, scene.splats);
-        std::vector<Trial> trials = {{"", 0.0, {}}};
+        std::vector<Trial> trials(1);  // the default's
         for (const uint32_t height : sizes)
             for (const uint32_t width : sizes) {
-                trials.push_back({});
+                trials.emplace_back();
                 trials.back().options.tile_width = width;
                 trials.back().options.tile_height = height;
             }
-        drawAll(device, scene, model, test::referenceOf(scene, test::settingsOf({})), trials);
+        drawAll(device, scene, model, test::referenceOf(scene, test::settingsOf({})), trials, 0);
         std::string grid = "# width, height, time over the default's\n";
         double best = INFINITY;
         for (size_t i = 1; i < trials.size(); i++) {
             const Trial& trial = trials[i];
-            const uint32_t height = sizes[(i - 1) / 4];
-            if (i % 4 == 1) {
+            const uint32_t height = sizes[(i - 1) / 3];
+            if (i % 3 == 1) {
                 if (i > 1) grid += "\n";
                 table += fmt::format("| {} | {} |", scene.name, height);
             }
             table += fmt::format(" {:.3f} |", trial.time);
-            if (i % 4 == 0) table += "\n";
+            if (i % 3 == 0) table += "\n";
             grid += fmt::format("{} {} {:.4f}\n", trial.options.tile_width, height, trial.time);
             best = std::min(best, trial.time);
         }
@@ -145,41 +147,44 @@ void compareStorages(Report& report, const Device& device, std::span<const Splat
                     deviceName(device));
     for (const SplatScene& scene : scenes) {
         const SplatPicture truth = test::referenceOf(scene, {});
+        struct Row {
+            std::string storage;
+            uint32_t degree;
+            double bytes, rmse;
+        };
+        std::vector<Row> rows;
+        SplatDrawer drawer(device);
+        std::vector<std::function<void()>> draws;  // of the first rows: the renderer's own storages
         std::string curves;
-        double first_time = 0.0;
         for (const SplatStorage& storage : splatStorages()) {
             curves += fmt::format("# {}: degree, bytes a splat, rmse\n", storage.name);
-            for (int degree = static_cast<int>(scene.splats.degree); degree >= 0; degree--) {
-                SplatScene stored = scene;
-                stored.splats = storage.store(withDegree(scene.splats, static_cast<uint32_t>(degree)));
-                const double rmse = test::comparePictures(test::referenceOf(stored, {}), truth).rmse;
-                const uint32_t bytes = storage.bytes(stored.splats.coefficientCount());
-                std::string time;
-                if (storage.name == "float32" || storage.name == "default") {
-                    const SplatModel model(device, stored.splats,
-                                           storage.name == "default" ? SplatModel::StorageHalf
-                                                                     : SplatModel::StorageFloat);
-                    SplatDrawer drawer(device);
-                    drawer.draw(scene, model);
-                    double best = INFINITY;
-                    for (uint32_t turn = 0; turn < 7; turn++) {
-                        const double begin = processSeconds();
-                        drawer.draw(scene, model);
-                        best = std::min(best, processSeconds() - begin);
-                    }
-                    if (first_time == 0.0) first_time = best;
-                    time = fmt::format("{:.3f}", best / first_time);
-                }
+            const uint32_t most = storage.name == ".splat" ? 0 : scene.splats.degree;
+            for (uint32_t degree = most + 1; degree-- > 0;) {
+                const StoredSplats stored = storage.store(withDegree(scene.splats, degree));
+                const test::SplatInstance instance = {&stored.splats};
+                const SplatPicture picture =
+                    test::renderSplats(scene.camera, scene.width, scene.height, {&instance, 1});
+                const double rmse = test::comparePictures(picture, truth).rmse;
+                rows.push_back({storage.name, degree, stored.bytes, rmse});
                 // What is exact has no place on a logarithmic axis.
-                curves += fmt::format("{} {} {}\n", degree, bytes, rmse > 0.0 ? fmt::format("{:.4e}", rmse) : "NaN");
-                table += fmt::format("| {} | {} | {} | {} | {} | {} |\n", scene.name, storage.name, degree, bytes,
-                                     rmse > 0.0 ? fmt::format("{:.1e}", rmse) : "0", time);
-                if (storage.name == "default" && degree == static_cast<int>(scene.splats.degree))
+                curves +=
+                    fmt::format("{} {} {}\n", degree, stored.bytes, rmse > 0.0 ? fmt::format("{:.4e}", rmse) : "NaN");
+                if (storage.name == "default" && degree == most)
                     report.add("splat.tradeoff." + scene.name + ".storage_rmse", rmse, "of a peak of 1",
                                "float32 storage", "float64 on the host");
+                if (storage.name != "float32" && storage.name != "default") continue;
+                const auto kind = storage.name == "default" ? SplatModel::StorageHalf : SplatModel::StorageFloat;
+                const SplatModel model(device, stored.splats, kind);
+                draws.push_back([&drawer, &scene, model] { drawer.draw(scene, model); });
+                draws.back()();
             }
             curves += "\n\n";
         }
+        const std::vector<double> times = bestTimes(draws);
+        for (size_t i = 0; i < rows.size(); i++)
+            table += fmt::format("| {} | {} | {} | {} | {} | {} |\n", scene.name, rows[i].storage, rows[i].degree,
+                                 rows[i].bytes, rows[i].rmse > 0.0 ? fmt::format("{:.1e}", rows[i].rmse) : "0",
+                                 i < times.size() ? fmt::format("{:.3f}", times[i] / times[0]) : "");
         check(writeTextFile(report.folder() / ("splat_storage_" + scene.name + ".dat"), curves));
     }
     fmt::print("{}\n", table);
@@ -188,7 +193,7 @@ void compareStorages(Report& report, const Device& device, std::span<const Splat
 
 void run(Report& report) {
     const Device device = createDevice();
-    const std::vector<SplatScene> scenes = splatViews();
+    const std::vector<SplatScene> scenes = splatViews(device);
     compareCutOffs(report, device, scenes);
     compareStorages(report, device, scenes);
     compareTiles(report, device, scenes);

@@ -32,7 +32,7 @@ glm::dmat3 eigenvectors(glm::dmat3& m) {
 }
 
 /// Covariances of six float16, as some viewers hold them, and harmonics in float16.
-Splats asHalfCovariance(const Splats& splats) {
+StoredSplats asHalfCovariance(const Splats& splats) {
     Splats result = splats;
     for (Vector3f& harmonic : result.harmonics) harmonic = {toHalf(harmonic.x), toHalf(harmonic.y), toHalf(harmonic.z)};
     for (size_t i = 0; i < splats.size(); i++) {
@@ -51,60 +51,43 @@ Splats asHalfCovariance(const Splats& splats) {
         for (int k = 0; k < 3; k++)
             result.scales[i][k] = static_cast<float>(std::sqrt(std::max(covariance[k][k], 0.0)));
     }
-    return result;
+    return {result, 28.0 + 6.0 * splats.coefficientCount()};
 }
 
-float quantise(float value, float scale, float offset) {
-    return (std::clamp(std::round(value * scale + offset), 0.0f, 255.0f) - offset) / scale;
+StoredSplats asSpz(const Splats& splats) {
+    const std::vector<std::byte> file = std::move(*check(encodeSpz(splats)));
+    return {std::move(*check(parseSpz(file, "splats"))), 17.0 + 3.0 * splats.coefficientCount()};
 }
 
-/// The numbers of an .spz file of version 2 (https://github.com/nianticlabs/spz): positions with 12 fractional bits,
-/// logarithms of scales in steps of 1/16, 8 bits for all else, of which harmonics use 5 at degree 1 and 4 above.
-Splats asSpz(const Splats& splats) {
-    Splats result = splats;
-    for (size_t i = 0; i < splats.size(); i++) {
-        for (int k = 0; k < 3; k++) {
-            result.positions[i][k] = std::round(splats.positions[i][k] * 4096.0f) / 4096.0f;
-            const float logarithm = std::log(std::max(splats.scales[i][k], 1e-30f));
-            result.scales[i][k] = std::exp(quantise(logarithm, 16.0f, 160.0f));
-        }
-        const Vector4f q = splats.rotations[i].w < 0.0f ? -splats.rotations[i] : splats.rotations[i];
-        Vector3d p;
-        for (int k = 0; k < 3; k++) p[k] = static_cast<double>(quantise(q[k], 127.5f, 127.5f));
-        const double w = std::sqrt(std::max(0.0, 1.0 - glm::dot(p, p)));
-        result.rotations[i] = Vector4f(glm::normalize(Vector4d(p, w)));
-        result.opacities[i] = quantise(splats.opacities[i], 255.0f, 0.0f);
-        const uint32_t n = splats.coefficientCount();
-        for (uint32_t c = 0; c < n; c++)
-            for (int k = 0; k < 3; k++) {
-                float& value = result.harmonics[i * n + c][k];
-                const float step = c < 4 ? 8.0f : 16.0f;
-                value = c == 0 ? quantise(value, 0.15f * 255.0f, 0.5f * 255.0f)
-                               : std::clamp(std::round(value * 128.0f / step) * step, -128.0f, 127.0f) / 128.0f;
-            }
-    }
-    return result;
+StoredSplats asDotSplat(const Splats& splats) {
+    const std::vector<std::byte> file = std::move(*check(encodeDotSplat(splats)));
+    return {std::move(*check(parseDotSplat(file, "splats"))), 32.0};
 }
 
 }  // namespace
 
-std::vector<test::SplatScene> splatViews() {
+std::vector<test::SplatScene> splatViews(const Device& device) {
     std::vector<test::SplatScene> views;
     if (test::splatsPath().empty())
         fmt::print("  left out: the real scene, which GLINT_SPLATS=FILE.ply names\n");
     else
         views.push_back(std::move(*check(test::realSplatScene(480, 270))));
-    views.push_back(test::surfaceScene(30000, 3, 480, 270));
-    views.back().name = "mesh";
+    views.push_back(test::meshScene(device, 50000, 32, 480, 270));
     return views;
 }
 
 std::vector<SplatStorage> splatStorages() {
-    return {{"float32", [](const Splats& splats) { return splats; }, [](uint32_t n) { return 44 + 12 * n; }},
-            {"default", [](const Splats& splats) { return SplatModel::decoded(splats, SplatModel::StorageHalf); },
-             [](uint32_t n) { return 36 + 6 * n; }},
-            {"float16 covariance", asHalfCovariance, [](uint32_t n) { return 28 + 6 * n; }},
-            {".spz", asSpz, [](uint32_t n) { return 16 + 3 * n; }}};
+    return {{"float32",
+             [](const Splats& splats) -> StoredSplats {
+                 return {splats, 44.0 + 12.0 * splats.coefficientCount()};
+             }},
+            {"default",
+             [](const Splats& splats) -> StoredSplats {
+                 return {SplatModel::decoded(splats, SplatModel::StorageHalf), 36.0 + 6.0 * splats.coefficientCount()};
+             }},
+            {"float16 covariance", asHalfCovariance},
+            {".spz", asSpz},
+            {".splat", asDotSplat}};
 }
 
 Splats withDegree(const Splats& splats, uint32_t degree) {

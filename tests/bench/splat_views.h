@@ -1,6 +1,6 @@
 #pragma once
 
-// The scenes of splats that the benchmarks of accuracy look at, and other ways to store splats.
+// The scenes of splats that the benchmarks of accuracy look at, and ways to store splats.
 
 #include "bench/bench.h"
 #include "support/splat_device.h"
@@ -13,16 +13,21 @@
 namespace glint::bench {
 
 /// The scenes of figures, "playbot" if $GLINT_SPLATS names it and "mesh", with pictures of 480 x 270.
-std::vector<test::SplatScene> splatViews();
+std::vector<test::SplatScene> splatViews(const Device& device);
 
-/// A way to store splats: what becomes of them, and the bytes that one takes.
-struct SplatStorage {
-    std::string name;
-    Splats (*store)(const Splats&);
-    uint32_t (*bytes)(uint32_t coefficients);
+/// Splats as something has stored them.
+struct StoredSplats {
+    Splats splats;
+    double bytes = 0.0;  ///< of each
 };
 
-/// Float32, the renderer's default, covariances in float16, and the quantisation of .spz files.
+struct SplatStorage {
+    std::string name;
+    StoredSplats (*store)(const Splats&);
+};
+
+/// Float32, the renderer's default, covariances in float16, and what files round: .spz (whose bytes are counted before
+/// they are packed) and .splat, which has no harmonics.
 std::vector<SplatStorage> splatStorages();
 
 /// The same splats with harmonics up to a degree.

@@ -1,8 +1,12 @@
 #include "support/splat_device.h"
 
+#include <glint/geometry/mesh_splats.h>
+#include <glint/geometry/primitives.h>
 #include <glint/graphics/picture.h>
+#include <glint/graphics/ray_caster.h>
 
 #include <array>
+#include <cmath>
 #include <stdexcept>
 
 namespace glint::test {
@@ -75,6 +79,33 @@ SplatPicture SplatDrawer::picture() {
 }
 
 Image SplatDrawer::colors() { return *need(readImage(device_, outputs_.color)); }
+
+SplatScene meshScene(const Device& device, uint32_t count, uint32_t quality, uint32_t width, uint32_t height) {
+    Mesh mesh = createTorus(1.0f, 0.4f, 96, 48);
+    for (Vector3f& position : mesh.positions) position.z += 0.8f;
+    const auto base = static_cast<uint32_t>(mesh.positions.size());
+    const Mesh floor = createPlane(5.0f);
+    mesh.positions.insert(mesh.positions.end(), floor.positions.begin(), floor.positions.end());
+    for (const uint32_t index : floor.indices) mesh.indices.push_back(base + index);
+    mesh.normals.insert(mesh.normals.end(), floor.normals.begin(), floor.normals.end());
+    mesh.texcoords.clear();
+
+    MeshSplatsOptions options;
+    options.count = count;
+    options.sky_rays = quality;
+    options.gloss = 0.4f;
+    options.color = [](const Vector3f& p) {
+        if (p.z > 0.1f) return Vector3f(0.7f, 0.25f, 0.1f);
+        const bool is_odd = (static_cast<int>(std::floor(p.x * 2.0f)) + static_cast<int>(std::floor(p.y * 2.0f))) & 1;
+        return is_odd ? Vector3f(0.65f) : Vector3f(0.15f, 0.3f, 0.35f);
+    };
+    RayCaster caster = std::move(*need(RayCaster::create(device, mesh)));
+    SplatScene scene = {"mesh", {}, {}, width, height};
+    scene.splats = std::move(
+        *need(splatsFromMesh(mesh, options, [&](std::span<const Ray> rays) { return caster.castAny(rays); })));
+    scene.camera = cameraAround(scene.splats, {0.25f, -0.36f, 0.27f}, {0, 0, 1}, 45.0f, width, height);
+    return scene;
+}
 
 SplatPicture referenceOf(const SplatScene& scene, const SplatSettings& settings) {
     const SplatInstance instance = {&scene.splats};

@@ -44,6 +44,10 @@ private:
     SplatRenderer::Outputs outputs_;
 };
 
+/// Splats of a mesh: a torus over a floor, with shadows that the device's rays find. `quality` is the number of rays
+/// from each splat to the sky.
+SplatScene meshScene(const Device& device, uint32_t count, uint32_t quality, uint32_t width, uint32_t height);
+
 /// The reference's picture of a scene: of what the storage holds, or of the scene itself.
 SplatPicture referenceOf(const SplatScene& scene, const SplatSettings& settings);
 SplatPicture referenceOf(const SplatScene& scene, SplatModel::Storage storage, const SplatSettings& settings);

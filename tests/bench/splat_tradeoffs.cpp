@@ -64,10 +64,10 @@ std::string fraction(double value) {
 
 /// Draws with all values of one cut-off. The error is that of this one: the truth leaves out what the other does.
 void compareCutOff(Report& report, const Device& device, std::span<const SplatScene> scenes, const std::string& name,
-                   float SplatRenderer::Options::*option, float test::SplatSettings::*setting,
+                   const char* title, float SplatRenderer::Options::*option, float test::SplatSettings::*setting,
                    std::span<const float> values) {
     std::string table = fmt::format("{}; 480 x 270 pixels.\n\n| scene | {} | time | rmse |\n|---|---|---|---|\n",
-                                    deviceName(device), name);
+                                    deviceName(device), title);
     const SplatRenderer::Options defaults;
     for (const SplatScene& scene : scenes) {
         test::SplatSettings settings = test::settingsOf(defaults);
@@ -95,12 +95,12 @@ void compareCutOff(Report& report, const Device& device, std::span<const SplatSc
 
 void compareCutOffs(Report& report, const Device& device, std::span<const SplatScene> scenes) {
     constexpr float stops[] = {1e-6f, 1e-5f, 1e-4f, 1e-3f, 1.0f / 255.0f, 1.0f / 64.0f, 1.0f / 16.0f, 0.25f};
-    compareCutOff(report, device, scenes, "stop", &SplatRenderer::Options::transmittance_stop,
+    compareCutOff(report, device, scenes, "stop", "transmittance stop", &SplatRenderer::Options::transmittance_stop,
                   &test::SplatSettings::transmittance_stop, stops);
     constexpr float cuts[] = {1e-5f,         1e-4f,         1.0f / 2048.0f, 1.0f / 1024.0f, 1.0f / 512.0f,
                               1.0f / 255.0f, 1.0f / 128.0f, 1.0f / 64.0f,   1.0f / 32.0f,   1.0f / 16.0f};
-    compareCutOff(report, device, scenes, "cut", &SplatRenderer::Options::alpha_cut, &test::SplatSettings::alpha_cut,
-                  cuts);
+    compareCutOff(report, device, scenes, "cut", "alpha cut", &SplatRenderer::Options::alpha_cut,
+                  &test::SplatSettings::alpha_cut, cuts);
 }
 
 void compareTiles(Report& report, const Device& device, std::span<const SplatScene> scenes) {

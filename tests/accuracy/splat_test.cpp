@@ -17,6 +17,9 @@ namespace {
 
 using Storage = SplatModel::Storage;
 
+/// Projected colors, which are about 1 at most, are rounded by up to 2^-14 = 6e-5; all else is below that.
+constexpr double rounding = 1e-4;
+
 class SplatAccuracyTest : public DeviceTest {
 protected:
     /// Expects what is promised of every scene: at least 60 dB against the float64 picture of the same values, and
@@ -25,11 +28,13 @@ protected:
         SCOPED_TRACE(scene.name);
         const SplatSettings settings = drawer.settings();
         const SplatPicture exact = drawer.draw(scene, SplatModel::StorageFloat);
-        const PictureError error = comparePictures(exact, referenceOf(scene, SplatModel::StorageFloat, settings));
+        const PictureError error =
+            comparePictures(exact, referenceOf(scene, SplatModel::StorageFloat, settings), rounding);
         EXPECT_GE(error.psnr(), 60.0);
-        // A splat whose alpha float32 takes to the other side of the cut changes a pixel by the cut; more than two in
-        // one pixel are not to be expected.
-        EXPECT_LE(error.largest, 2.0 * static_cast<double>(settings.alpha_cut) + 1e-4);
+        // A splat whose alpha float32 takes to the other side of the cut changes a pixel by the cut. That is rare, and
+        // more than two in one pixel are not to be expected.
+        EXPECT_LE(error.above, 2 + scene.width * scene.height / 1000);
+        EXPECT_LE(error.largest, 2.0 * static_cast<double>(settings.alpha_cut) + rounding);
 
         const SplatPicture expected = referenceOf(scene, settings);
         const SplatPicture half = drawer.draw(scene, SplatModel::StorageHalf);
@@ -224,12 +229,8 @@ TEST_F(SplatAccuracyTest, TilesDoNotShow) {
         for (size_t i = 0; i < scenes.size(); i++) {
             const SplatPicture picture = drawer.draw(scenes[i], SplatModel::StorageFloat);
             if (first.size() == i) first.push_back(picture);
-            uint64_t differing = 0;
-            for (size_t at = 0; at < picture.color.size(); at++) {
-                const Vector3d error = glm::abs(picture.color[at] - first[i].color[at]);
-                differing += std::max({error.x, error.y, error.z}) > 1e-4;
-            }
-            EXPECT_LE(differing, picture.color.size() / 1000) << scenes[i].name << ", " << width << "x" << height;
+            EXPECT_LE(comparePictures(picture, first[i], rounding).above, picture.color.size() / 1000)
+                << scenes[i].name << ", " << width << "x" << height;
         }
     }
 }

@@ -81,7 +81,7 @@ void run(Report& report) {
             table += fmt::format("| {}, {} splats | {} | {:.1e} | {:.1e} | {} | {:.2f} % |\n", scene.name,
                                  scene.splats.size(), titles[kind], errors[kind].rmse, errors[kind].largest,
                                  psnrOf(errors[kind]),
-                                 100.0 * static_cast<double>(errors[kind].visible) / (scene.width * scene.height));
+                                 100.0 * static_cast<double>(errors[kind].above) / (scene.width * scene.height));
     }
     fmt::print("{}\n", table);
     check(writeTextFile(report.folder() / "splat_errors.md", table));

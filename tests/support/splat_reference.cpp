@@ -311,7 +311,7 @@ SplatPicture renderSplats(const Camera& camera, uint32_t width, uint32_t height,
 
 double PictureError::psnr() const { return rmse > 0.0 ? -20.0 * std::log10(rmse) : 999.0; }
 
-PictureError comparePictures(const SplatPicture& actual, const SplatPicture& expected) {
+PictureError comparePictures(const SplatPicture& actual, const SplatPicture& expected, double threshold) {
     if (actual.width != expected.width || actual.height != expected.height)
         throw std::runtime_error("pictures of different sizes are compared");
     PictureError error;
@@ -323,7 +323,7 @@ PictureError comparePictures(const SplatPicture& actual, const SplatPicture& exp
             largest = std::numeric_limits<double>::infinity();
         squares += std::isfinite(largest) ? glm::dot(difference, difference) : largest;
         error.largest = std::max(error.largest, largest);
-        error.visible += largest > 1.0 / 255.0;
+        error.above += largest > threshold;
     }
     error.rmse = std::sqrt(squares / (3.0 * static_cast<double>(expected.color.size())));
     return error;

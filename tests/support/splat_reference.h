@@ -80,11 +80,11 @@ SplatPicture renderSplats(const Camera& camera, uint32_t width, uint32_t height,
 struct PictureError {
     double rmse = 0.0;     ///< root of the mean square
     double largest = 0.0;  ///< infinity where one is not finite
-    uint64_t visible = 0;  ///< pixels with a channel that differs by more than 1/255
+    uint64_t above = 0;    ///< pixels with a channel that differs by more than the threshold
 
     /// Signal-to-noise ratio for a peak of 1, in dB; 999 for equal pictures.
     double psnr() const;
 };
-PictureError comparePictures(const SplatPicture& actual, const SplatPicture& expected);
+PictureError comparePictures(const SplatPicture& actual, const SplatPicture& expected, double threshold = 1.0 / 255.0);
 
 }  // namespace glint::test

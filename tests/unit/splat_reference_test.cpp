@@ -366,10 +366,10 @@ TEST(SplatReferenceTest, PicturesAreCompared) {
     EXPECT_EQ(comparePictures(a, b).psnr(), 999.0);
     b.color[1].x = 0.5 + 0.01 * std::sqrt(6.0);
     EXPECT_NEAR(comparePictures(a, b).psnr(), 40.0, 1e-9);
-    EXPECT_EQ(comparePictures(a, b).visible, 1u);
+    EXPECT_EQ(comparePictures(a, b).above, 1u);
     b.color[0].y = NAN;
     EXPECT_EQ(comparePictures(b, a).largest, std::numeric_limits<double>::infinity());
-    EXPECT_EQ(comparePictures(b, a).visible, 2u);
+    EXPECT_EQ(comparePictures(b, a).above, 2u);
 }
 
 }  // namespace glint::test

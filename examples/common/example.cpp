@@ -88,6 +88,12 @@ void Example::add(const std::string& flag, std::filesystem::path& value, const s
     parser_->app.add_option(flag, value, help)->type_name("FILE");
 }
 
+void Example::add(const std::string& flag, std::vector<std::filesystem::path>& values, const std::string& help) {
+    parser_->app.add_option(flag, values, help)
+        ->type_name("FILE")
+        ->expected(1)
+        ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
 void Example::add(const std::string& flag, uint32_t& value, const std::string& help) {
     parser_->app.add_option(flag, value, help)->type_name("N")->capture_default_str();
 }

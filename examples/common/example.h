@@ -62,6 +62,8 @@ public:
     /// Further arguments of this example, to be added before parse(); what `value` holds before is the default.
     void add(const std::string& flag, std::string& value, const std::string& help);
     void add(const std::string& flag, std::filesystem::path& value, const std::string& help);
+    /// May be given several times.
+    void add(const std::string& flag, std::vector<std::filesystem::path>& values, const std::string& help);
     void add(const std::string& flag, uint32_t& value, const std::string& help);
     void add(const std::string& flag, float& value, const std::string& help);
     /// An argument without a value: `value` becomes true if it is given.

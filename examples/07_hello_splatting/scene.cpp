@@ -114,7 +114,8 @@ Vector3f ballColor(const Vector3f& position) {
 
 Vector3f floorColor(const Vector3f& position) {
     const auto tile = [](float x) { return static_cast<int>(std::floor(x * 5.0f)); };
-    return (tile(position.x) + tile(position.y)) % 2 == 0 ? Vector3f(0.5f, 0.49f, 0.47f) : Vector3f(0.33f, 0.33f, 0.34f);
+    return (tile(position.x) + tile(position.y)) % 2 == 0 ? Vector3f(0.5f, 0.49f, 0.47f)
+                                                          : Vector3f(0.33f, 0.33f, 0.34f);
 }
 
 }  // namespace

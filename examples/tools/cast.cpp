@@ -1,5 +1,6 @@
 // glint cast: rays in, hits out, as NumPy arrays of any length.
 
+#include "progress.h"
 #include "tool.h"
 
 #include <glint/base/file.h>
@@ -10,10 +11,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include <unistd.h>
-
-#include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <memory>
 #include <optional>
@@ -37,24 +34,6 @@ struct Options {
     bool any = false;
 };
 
-volatile std::sig_atomic_t interrupted = 0;
-
-/// From here on SIGINT and SIGTERM only say that they came; a second one ends the program as ever.
-void catchSignals() {
-    struct sigaction action = {};
-    action.sa_handler = [](int) { interrupted = 1; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
-    ::sigaction(SIGINT, &action, nullptr);
-    ::sigaction(SIGTERM, &action, nullptr);
-}
-
-Status checkInterrupt() {
-    if (!interrupted) return {};
-    return Error::inFile(ErrorCode::InvalidArgument, "tool.interrupted", "interrupted, nothing is left behind", {}, 0);
-}
-
-double now() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
 /// Adds the time of a scope.
 class Stopwatch {
 public:
@@ -70,37 +49,6 @@ private:
 
 struct Seconds {
     double load = 0.0, build = 0.0, cast = 0.0, read = 0.0, write = 0.0;
-};
-
-/// A line on stderr that is written over, if a person is looking.
-class Progress {
-public:
-    explicit Progress(uint64_t total) : total_(total), shown_(::isatty(STDERR_FILENO) != 0), begin_(now()) {}
-    ~Progress() {
-        if (drawn_) fmt::print(stderr, "\r\x1b[K");
-    }
-    Progress(const Progress&) = delete;
-    Progress& operator=(const Progress&) = delete;
-
-    void update(uint64_t done) {
-        const double time = now();
-        if (!shown_ || time - last_ < 0.1) return;
-        last_ = time;
-        drawn_ = true;
-        const double share = static_cast<double>(done) / static_cast<double>(total_);
-        const double speed = static_cast<double>(done) / (time - begin_);
-        const auto filled = static_cast<int>(share * 30);
-        fmt::print(stderr, "\r[{:#<{}}{:.<{}}] {:3.0f} %  {:.2f} million rays a second, {:.0f} s left\x1b[K", "",
-                   filled, "", 30 - filled, share * 100, speed * 1e-6, static_cast<double>(total_ - done) / speed);
-        std::fflush(stderr);
-    }
-
-private:
-    uint64_t total_;
-    bool shown_;
-    bool drawn_ = false;
-    double begin_;
-    double last_ = 0.0;
 };
 
 NpyHeader hitHeader(bool any, uint64_t count) {
@@ -171,7 +119,7 @@ Status castAll(const Options& options, RayCaster& caster, NpyReader& reader, Out
     outcome.rays = reader.header().shape[0];
     Expected<NpyWriter> writer = NpyWriter::create(options.hits, hitHeader(options.any, outcome.rays));
     if (!writer) return writer.error();
-    Progress progress(outcome.rays);
+    Progress progress(outcome.rays, "million rays", 1e-6);
     uint64_t done = 0;
 
     const auto fetch = [&](std::span<Ray> rays) -> Expected<uint64_t> {
@@ -306,8 +254,7 @@ Command castCommand(CLI::App& app) {
         ->type_name("N")
         ->check(CLI::Range(0u, 255u));
     sub->add_option("--stats", options->stats, "Write times and counts to this file")->type_name("FILE.json");
-    sub->add_option("--adapter", options->adapter, "Adapter: its index or a part of its name")->type_name("N|NAME");
-    sub->add_option("--api", options->api, "Graphics API")->type_name("NAME");
+    addDevice(*sub, options->adapter, options->api);
     addTracing(*sub, options->tracing);
     return {sub, [options] { return run(*options); }};
 }

@@ -39,6 +39,25 @@ void addTracing(CLI::App& app, glint::TracingEngine& engine) {
         ->check([&engine](const std::string& text) { return parseTracingEngine(text, engine); });
 }
 
+void addDevice(CLI::App& app, std::string& adapter, std::string& api) {
+    app.add_option("--adapter", adapter, "Adapter: its index or a part of its name")->type_name("N|NAME");
+    app.add_option("--api", api, "Graphics API")->type_name("NAME");
+}
+
+CLI::Option* addVector(CLI::App& app, const std::string& flag, glint::Vector3f& value, const std::string& help) {
+    return app
+        .add_option_function<std::vector<float>>(
+            flag,
+            [&value](const std::vector<float>& numbers) {
+                value = {numbers[0], numbers[1], numbers[2]};
+            },
+            help)
+        ->type_name("X,Y,Z")
+        ->delimiter(',')
+        ->expected(3)
+        ->default_str(fmt::format("{},{},{}", value.x, value.y, value.z));
+}
+
 int fail(const char* command, const glint::Error& error) {
     // Whoever calls the program has no use for a line of its sources; of a shader or a mesh, yes.
     const bool in_sources = error.file().ends_with(".cpp");

@@ -200,9 +200,10 @@ Command splatConvertCommand(CLI::App& app) {
 }  // namespace
 
 Command splatCommand(CLI::App& app) {
-    CLI::App* sub = app.add_subcommand("splat", "Gaussian splats: looks at scenes, converts them");
+    CLI::App* sub = app.add_subcommand("splat", "Gaussian splats: looks at scenes, converts, renders and makes them");
     sub->require_subcommand(1);
-    const std::vector<Command> commands = {splatInfoCommand(*sub), splatConvertCommand(*sub)};
+    const std::vector<Command> commands = {splatInfoCommand(*sub), splatConvertCommand(*sub), splatRenderCommand(*sub),
+                                           splatFromMeshCommand(*sub)};
     return {sub, [commands] {
                 for (const Command& command : commands)
                     if (command.app->parsed()) return command.run();

@@ -4,6 +4,7 @@
 
 #include <glint/base/error.h>
 #include <glint/device/features.h>
+#include <glint/math/math.h>
 
 #include <CLI/CLI.hpp>
 
@@ -31,6 +32,14 @@ Command shaderCommand(CLI::App& app);
 Command castCommand(CLI::App& app);
 Command splatCommand(CLI::App& app);
 
+// Subcommands of `glint splat` that have a source of their own.
+Command splatRenderCommand(CLI::App& app);
+Command splatFromMeshCommand(CLI::App& app);
+
+/// Adds --adapter and --api: where to compute.
+void addDevice(CLI::App& app, std::string& adapter, std::string& api);
+/// Adds an option of three numbers: X,Y,Z.
+CLI::Option* addVector(CLI::App& app, const std::string& flag, glint::Vector3f& value, const std::string& help);
 /// Adds --tracing auto|driver|software: the engine for ray tracing.
 void addTracing(CLI::App& app, glint::TracingEngine& engine);
 

@@ -17,6 +17,7 @@ namespace glint {
 /// What a reader did with splats that have values which mean nothing; docs/splatting.md has the rule. Each splat is
 /// counted once, by the first of its bad values in the order here.
 struct SplatReport {
+    /// Splats by the kind of their bad value.
     struct Counts {
         uint64_t position = 0;
         uint64_t scale = 0;

@@ -39,6 +39,7 @@ public:
         MethodPlain,
     };
 
+    /// How splats are drawn.
     struct Options {
         uint32_t tile_width = 0;  ///< 8, 16, 32 or 64 pixels; 0: what suits the device, and both then
         uint32_t tile_height = 0;

@@ -20,16 +20,15 @@ struct PrefixScan::State {
 };
 
 Status PrefixScan::State::create(const Device& device, uint32_t groups, uint32_t room, Where where) {
-    if (Status status = regions.create(device, "prefix scan", groups, room, where); !status) return status;
-    const uint32_t group = regions.isCpu() ? 8 : 256;
-    const uint32_t run = regions.isCpu() ? 256 : 8;
+    if (Status status = regions.create(device, "prefix scan", groups, 1024, room, where); !status) return status;
     if (mode == ModeSingle) {
-        sums = regions.createBuffer(uint64_t{regions.groups()} * 4, "prefix scan: sums", where);
+        const uint32_t columns = regions.form().tiles ? 1 : regions.form().group;
+        sums = regions.createBuffer(uint64_t{regions.groups()} * columns * 4, "prefix scan: sums", where);
         if (!sums) return sums.error();
     }
     for (uint32_t stage = mode == ModeSingle ? 0 : 2; stage < (mode == ModeSingle ? 2 : 3); stage++) {
-        const std::string macros = fmt::format("GLINT_GROUP={}u; GLINT_RUN={}u; GLINT_STAGE={}", group, run, stage);
-        Expected<Kernel> kernel = regions.createKernel("scan", macros, where);
+        Expected<Kernel> kernel =
+            regions.createKernel("scan", fmt::format("GLINT_STAGE={}", stage), regions.form().group, where);
         if (!kernel) return kernel.error();
         kernels.push_back(std::move(*kernel));
     }
@@ -39,10 +38,12 @@ Status PrefixScan::State::create(const Device& device, uint32_t groups, uint32_t
 void PrefixScan::State::record(Compute& compute, const Buffer& data, const detail::ParallelRegions::Source& source,
                                Where where) const {
     detail::ParallelWork work = source.work;
+    work.words = static_cast<uint32_t>(data.getSize() / 4);
     work.groups = regions.groups();
     if (mode == ModeMultiple) work.groups = std::min(work.groups, work.count);
     for (const Kernel& kernel : kernels) {
-        regions.bind(compute, kernel, data, source);
+        regions.bind(compute, kernel, source);
+        compute.setStorageBuffer(3, data);
         if (mode == ModeSingle) compute.setStorageBuffer(4, sums);
         regions.run(compute, work, kernel, work.groups, where);
     }

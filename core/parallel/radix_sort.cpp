@@ -12,25 +12,40 @@ static_assert(sizeof(RadixSort::Region) == sizeof(detail::ParallelRegions::Regio
 namespace {
 
 /// GLINT_STAGE of shaders/parallel/sort.h.
-enum Stage : uint32_t { StageCount, StageSum, StageScatter, StageCopy, StageRegions, stages };
+enum Stage : uint32_t { StageList, StageCount, StageRows, StageMove, StageSmall, stages };
+
+/// A digit has at most eight bits, and an even number of passes ends where it began.
+constexpr uint32_t digits = 256;
 
 }  // namespace
 
 struct RadixSort::State {
+    /// What a pass over large regions takes: kernels for one region or for a list of jobs.
+    struct Passes {
+        Kernel kernels[stages];
+        Buffer table;
+        uint32_t shares = 0;  ///< the most that all regions together have
+    };
+
     Flags flags = 0;
     uint32_t capacity = 0;
-    uint32_t digit = 0;  ///< bits that are sorted by at a time
+    uint32_t tile = 0;   ///< elements of a group at a time
+    uint32_t small = 0;  ///< the most elements of a region that one group sorts
     detail::ParallelRegions regions;
-    Kernel kernels[stages];
+    Passes single, multiple;
     Buffer scratch;
-    Buffer sums;  ///< for each digit, of each group's share
+    Buffer small_scratch;  ///< of each group, where threads walk runs
+    Buffer jobs;
 
     Status create(const Device& device, uint32_t groups, uint32_t room, Where where);
+    Status createKernels(Passes& passes, bool is_multiple, Where where) const;
     Status check(std::span<const Region> list, const Buffer& data, Where where) const;
     void record(Compute& compute, const Buffer& data, const detail::ParallelRegions::Source& source, uint32_t bits,
                 Where where) const;
-    void runSingle(Compute& compute, detail::ParallelWork work, const Buffer& data,
+    void runPasses(Compute& compute, const Passes& passes, detail::ParallelWork work, const Buffer& data,
                    const detail::ParallelRegions::Source& source, uint32_t bits, Where where) const;
+    void runRegions(Compute& compute, detail::ParallelWork work, const Buffer& data,
+                    const detail::ParallelRegions::Source& source, uint32_t bits, Where where) const;
 };
 
 Status RadixSort::State::create(const Device& device, uint32_t groups, uint32_t room, Where where) {
@@ -39,33 +54,61 @@ Status RadixSort::State::create(const Device& device, uint32_t groups, uint32_t 
         return makeError(where, ErrorCode::InvalidArgument, "sort.flags",
                          "RadixSort: flags {:#x}; FlagSingle or FlagMultiple is needed, FlagKeys excludes FlagOrder",
                          flags);
-    if (Status status = regions.create(device, "radix sort", groups, room, where); !status) return status;
-    const uint64_t bytes = uint64_t{capacity} * (flags & FlagKeys ? 4 : 8);
+    if (Status status = regions.create(device, "radix sort", groups, 4096, room, where); !status) return status;
+    const uint64_t element = flags & FlagKeys ? 4 : 8;
     const uint64_t limit = device.getFeatures().maxStorageSize;
-    if (bytes == 0 || bytes > limit)
+    if (capacity == 0 || capacity * element > limit)
         return makeError(where, ErrorCode::OutOfRange, "sort.capacity",
                          "RadixSort: {} elements need {} bytes of scratch memory, the device takes 1 to {}", capacity,
-                         bytes, limit);
-    // Counters take 8 KiB of a group's memory both ways.
-    const uint32_t group = regions.isCpu() ? 8 : 128;
-    const uint32_t run = regions.isCpu() ? 2048 : 8;
-    digit = regions.isCpu() ? 8 : 4;
-    scratch = regions.createBuffer(bytes, "radix sort: scratch", where);
+                         capacity * element, limit);
+    const detail::ParallelForm& form = regions.form();
+    // As many keys, ranks and payloads as registers take, but few where they make the compiler slow; runs that are long
+    // against the counters of a thread.
+    tile = form.group * (!form.tiles ? 4096 : device.getInfo().cpu ? 2 : 16);
+    small = form.tiles ? tile : 16384;
+    scratch = regions.createBuffer(capacity * element, "radix sort: scratch", where);
     if (!scratch) return scratch.error();
+    const uint32_t tiles = (capacity - 1) / tile + 1;
+    const uint64_t columns = form.tiles ? 1 : form.group;
     if (flags & FlagSingle) {
-        sums = regions.createBuffer((uint64_t{regions.groups()} << digit) * 4, "radix sort: sums", where);
-        if (!sums) return sums.error();
+        single.shares = std::min(tiles, regions.groups());
+        single.table = regions.createBuffer((1 + single.shares * columns) * digits * 4, "radix sort: table", where);
+        if (!single.table) return single.table.error();
+        if (Status status = createKernels(single, false, where); !status) return status;
     }
+    if (flags & FlagMultiple) {
+        // Each job may end in a tile that is not full.
+        const uint64_t job_room = capacity / small + 1;
+        multiple.shares = tiles + static_cast<uint32_t>(job_room);
+        multiple.table =
+            regions.createBuffer((job_room + multiple.shares * columns) * digits * 4, "radix sort: table", where);
+        if (!multiple.table) return multiple.table.error();
+        jobs = regions.createBuffer((2 + 8 * job_room + multiple.shares) * 4, "radix sort: jobs", where);
+        if (!jobs) return jobs.error();
+        if (!form.tiles) {
+            small_scratch = regions.createBuffer(uint64_t{regions.groups()} * std::min(small, capacity) * 8,
+                                                 "radix sort: small regions", where);
+            if (!small_scratch) return small_scratch.error();
+        }
+        if (Status status = createKernels(multiple, true, where); !status) return status;
+    }
+    return {};
+}
+
+Status RadixSort::State::createKernels(Passes& passes, bool is_multiple, Where where) const {
+    const detail::ParallelForm& form = regions.form();
     const int payload = flags & FlagKeys ? 0 : flags & FlagOrder ? 2 : 1;
     for (uint32_t stage = 0; stage < stages; stage++) {
-        if ((flags & (stage == StageRegions ? FlagMultiple : FlagSingle)) == 0) continue;
+        if (!is_multiple && (stage == StageList || stage == StageSmall)) continue;
+        // A row has as many elements as there are shares.
+        const uint32_t group = stage == StageRows && form.tiles ? std::min(4 * form.group, form.most) : form.group;
         Expected<Kernel> kernel = regions.createKernel(
             "sort",
-            fmt::format("GLINT_GROUP={}u; GLINT_RUN={}u; GLINT_DIGIT={}; GLINT_PAYLOAD={}; GLINT_STAGE={}", group, run,
-                        digit, payload, stage),
-            where);
+            fmt::format("GLINT_TILE={}u; GLINT_SMALL={}u; GLINT_PAYLOAD={}; GLINT_MANY={}; GLINT_STAGE={}", tile, small,
+                        payload, is_multiple && stage != StageSmall ? 1 : 0, stage),
+            group, where);
         if (!kernel) return kernel.error();
-        kernels[stage] = std::move(*kernel);
+        passes.kernels[stage] = std::move(*kernel);
     }
     return {};
 }
@@ -93,34 +136,54 @@ Status RadixSort::State::check(std::span<const Region> list, const Buffer& data,
 void RadixSort::State::record(Compute& compute, const Buffer& data, const detail::ParallelRegions::Source& source,
                               uint32_t bits, Where where) const {
     detail::ParallelWork work = source.work;
+    work.words = static_cast<uint32_t>(data.getSize() / 4);
     work.groups = regions.groups();
     work.capacity = capacity;
-    if (work.count == 1 && (flags & FlagSingle)) return runSingle(compute, work, data, source, bits, where);
-    if ((flags & FlagMultiple) == 0) return runSingle(compute, work, data, source, bits, where);
-    work.groups = std::min(work.groups, work.count);
-    work.bits = bits;
-    compute.clearBuffer(regions.report(), 0, 12, 4, where);
-    regions.bind(compute, kernels[StageRegions], data, source);
-    compute.setStorageBuffer(4, scratch);
-    regions.run(compute, work, kernels[StageRegions], work.groups, where);
+    if ((flags & FlagMultiple) == 0 || (work.count == 1 && (flags & FlagSingle)))
+        runPasses(compute, single, work, data, source, bits, where);
+    else
+        runRegions(compute, work, data, source, bits, where);
 }
 
-void RadixSort::State::runSingle(Compute& compute, detail::ParallelWork work, const Buffer& data,
+void RadixSort::State::runPasses(Compute& compute, const Passes& passes, detail::ParallelWork work, const Buffer& data,
                                  const detail::ParallelRegions::Source& source, uint32_t bits, Where where) const {
-    const auto play = [&](Stage stage, uint32_t groups) {
-        regions.bind(compute, kernels[stage], data, source);
-        compute.setStorageBuffer(4, scratch);
-        if (stage != StageCopy) compute.setStorageBuffer(5, sums);
-        regions.run(compute, work, kernels[stage], groups, where);
-    };
-    for (work.shift = 0; work.shift < bits; work.shift += digit) {
-        work.bits = std::min(digit, bits - work.shift);
-        play(StageCount, work.groups);
-        play(StageSum, 1);
-        play(StageScatter, work.groups);
-        work.flipped ^= 1;
+    // Groups that take a row each, or a row a thread.
+    const uint32_t rows = regions.form().tiles ? digits : digits / regions.form().group;
+    const uint32_t count = (bits + 15) / 16 * 2;
+    const uint32_t width = (bits + count - 1) / count;
+    for (uint32_t i = 0; i < count; i++) {
+        // A pass without bits that are left copies.
+        work.shift = std::min(i * width, 31u);
+        work.bits = std::min(width, bits - std::min(i * width, bits));
+        work.flipped = i % 2;
+        for (const Stage stage : {StageCount, StageRows, StageMove}) {
+            regions.bind(compute, passes.kernels[stage], source);
+            const Buffer& from = work.flipped ? scratch : data;
+            const Buffer& to = work.flipped ? data : scratch;
+            compute.setStorageBuffers(3, {from, to, passes.table});
+            if (passes.kernels[StageList]) compute.setStorageBuffer(6, jobs);
+            const uint32_t count_of_groups = stage == StageRows ? rows : std::min(regions.groups(), passes.shares);
+            regions.run(compute, work, passes.kernels[stage], count_of_groups, where);
+        }
     }
-    if (work.flipped) play(StageCopy, work.groups);
+}
+
+void RadixSort::State::runRegions(Compute& compute, detail::ParallelWork work, const Buffer& data,
+                                  const detail::ParallelRegions::Source& source, uint32_t bits, Where where) const {
+    compute.clearBuffer(regions.report(), 0, 12, 4, where);
+    compute.clearBuffer(jobs, 0, 0, 8, where);
+    work.bits = bits;
+    const Kernel& list = multiple.kernels[StageList];
+    regions.bind(compute, list, source);
+    compute.setStorageBuffers(3, {data, scratch, jobs});
+    regions.run(compute, work, list, std::min(regions.groups(), (work.count - 1) / regions.form().group + 1), where);
+
+    const Kernel& small_regions = multiple.kernels[StageSmall];
+    regions.bind(compute, small_regions, source);
+    compute.setStorageBuffers(3, {data, small_scratch ? small_scratch : scratch});
+    regions.run(compute, work, small_regions, std::min(work.groups, work.count), where);
+
+    runPasses(compute, multiple, work, data, source, bits, where);
 }
 
 Status RadixSort::create(const Device& device, Flags flags, uint32_t size, uint32_t groups, uint32_t regions,

@@ -3,6 +3,7 @@
 #include <glint/base/format_error.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 namespace glint::detail {
 
@@ -12,15 +13,30 @@ constexpr uint64_t region_bytes = sizeof(ParallelRegions::Region);
 
 }  // namespace
 
-Status ParallelRegions::create(const Device& device, std::string_view name, uint32_t groups, uint32_t regions,
-                               Where where) {
+ParallelForm parallelFormOf(const Device& device) {
+    const Features& features = device.getFeatures();
+    ParallelForm form;
+    const char* const asked = std::getenv("GLINT_PARALLEL");
+    form.tiles = asked ? std::string_view(asked) == "tiles" : !device.getInfo().cpu;
+    form.subgroup = std::max(features.minSubgroupSize, 1u);
+    form.is_wide = features.maxSubgroupSize > 32;
+    // Counters of eight subgroups take 8 KiB. On CPUs a subgroup a group makes barriers cheap.
+    form.group = form.tiles ? std::clamp(8 * form.subgroup, 64u, features.maxGroupThreads) : 8;
+    form.subgroup = std::min(form.subgroup, form.group);
+    form.most = features.maxGroupThreads;
+    return form;
+}
+
+Status ParallelRegions::create(const Device& device, std::string_view name, uint32_t groups, uint32_t gpu_groups,
+                               uint32_t regions, Where where) {
     if (!device) return device.error().at(where);
     if (regions == 0)
         return makeError(where, ErrorCode::InvalidArgument, "parallel.regions", "{} with room for 0 regions", name);
     device_ = device;
-    // A few groups for each core, so that the last to end is not waited for long; enough threads to fill a GPU.
+    form_ = parallelFormOf(device);
+    // A few groups for each core, so that the last to end is not waited for long.
     const uint32_t limit = device.getFeatures().maxGroupCountX;
-    groups_ = std::min(groups != 0 ? groups : isCpu() ? 64 : 1024, limit);
+    groups_ = std::min(groups != 0 ? groups : form_.tiles ? gpu_groups : 64, limit);
     room_ = regions;
     regions_ =
         device_.createBuffer(Buffer::FlagStorage, regions * region_bytes, fmt::format("{}: regions", name), where);
@@ -92,9 +108,9 @@ Status ParallelRegions::checkRange(const Buffer& data, uint64_t offset, uint64_t
                      "{} elements from element {} on, buffer '{}' has {}", size, offset, data.name(), words);
 }
 
-void ParallelRegions::bind(Compute& compute, const Kernel& kernel, const Buffer& data, const Source& source) const {
+void ParallelRegions::bind(Compute& compute, const Kernel& kernel, const Source& source) const {
     compute.setKernel(kernel);
-    compute.setStorageBuffers(0, {data, source.regions, source.counts, report_});
+    compute.setStorageBuffers(0, {source.regions, source.counts, report_});
 }
 
 void ParallelRegions::run(Compute& compute, const ParallelWork& work, const Kernel& kernel, uint32_t groups,
@@ -132,10 +148,14 @@ Buffer ParallelRegions::createBuffer(uint64_t size, std::string_view name, Where
     return Device(device_).createBuffer(Buffer::FlagStorage, size, name, where);
 }
 
-Expected<Kernel> ParallelRegions::createKernel(std::string_view file, std::string_view macros, Where where) const {
+Expected<Kernel> ParallelRegions::createKernel(std::string_view file, std::string_view macros, uint32_t group,
+                                               Where where) const {
     Device device = device_;
     Kernel kernel = device.createKernel(file, where);
-    kernel.createShaderGLSL(fmt::format("#include <glint/parallel/{}.h>\n", file), macros, where);
+    kernel.createShaderGLSL(fmt::format("#include <glint/parallel/{}.h>\n", file),
+                            fmt::format("GLINT_TILES={}; GLINT_GROUP={}u; GLINT_SUBGROUP={}u; GLINT_WIDE={}; {}",
+                                        form_.tiles ? 1 : 0, group, form_.subgroup, form_.is_wide ? 1 : 0, macros),
+                            where);
     if (Status status = kernel.create(where); !status) return unexpected(status.error());
     return kernel;
 }

@@ -1,130 +1,49 @@
-// Stable sorts of regions {keys, payload, size, -} by digits, the lowest first, from the data to scratch memory and
-// back. GLINT_STAGE 0: how often each digit occurs in each group's share of a region. 1: where each share's keys of each
-// digit go, which is the running sum of that. 2: moves them. 3: copies what has ended in scratch memory. 4: all of it
-// for whole regions, a group each.
+// Stable sorts of regions {keys, payload, size, -} by digits of up to 8 bits, the lowest first, from the data to scratch
+// memory and back. A pass over large regions takes three kernels: GLINT_STAGE 1 counts the digits of each share of a
+// region, 2 makes running sums of each digit's counts, 3 moves each share's elements to where those say. Stage 4 sorts
+// small regions, a group each, and stage 0 makes a list of the others: the jobs.
+//
+// GLINT_MANY 0: one region, shared by the groups, is the only job. 1: jobs from the list, a tile a share.
 // GLINT_PAYLOAD 0: keys alone. 1: words that go with them. 2: words that become the keys' places.
 #pragma once
 
 #include <glint/parallel/common.h>
 
-const uint DIGITS = 1u << GLINT_DIGIT;
+const uint DIGITS = 256u;
+// Elements of a group at a time; columns of a share in the table of counts; the largest of the small regions.
+const uint TILE = GLINT_TILE;
+const uint COLUMNS = GLINT_TILES == 1 ? 1u : GLINT_GROUP;
+const uint SMALL = GLINT_SMALL;
 
-// Keys, then payloads.
-layout(std430, binding = 4) coherent buffer Scratch { uint scratch[]; };
-#if GLINT_STAGE < 3
-layout(std430, binding = 5) buffer Sums { uint sums[]; };
-#endif
-
-// A column for each thread, so that no two share a counter.
-shared uint counters[DIGITS * GLINT_GROUP];
-shared uint places[DIGITS];   // where the next tile's keys of a digit go
-shared uint offsets[DIGITS];  // from counters to places in this tile
-shared uint taken;
-
-uint keys, payload, size, room;
-uint shift, mask;
-bool is_flipped, is_first;
-
-uint readKey(uint i) { return is_flipped ? scratch[room + i] : data[keys + i]; }
-uint digitOf(uint key) { return (key >> shift) & mask; }
-
-uint readPayload(uint i) {
-#if GLINT_PAYLOAD == 2
-    if (is_first) return i;
-#endif
-    return is_flipped ? scratch[work.capacity + room + i] : data[payload + i];
-}
-
-void write(uint i, uint key, uint value) {
-    // Regions that overlap change while they are sorted.
-    if (i >= size) return;
-    if (is_flipped) {
-        data[keys + i] = key;
-#if GLINT_PAYLOAD
-        data[payload + i] = value;
-#endif
-    } else {
-        scratch[room + i] = key;
-#if GLINT_PAYLOAD
-        scratch[work.capacity + room + i] = value;
-#endif
-    }
-}
-
-void move(uint i, uint target) {
-#if GLINT_PAYLOAD
-    write(target, readKey(i), readPayload(i));
+#if GLINT_STAGE == 4
+layout(std430, binding = 3) coherent buffer Source { uint source[]; };
+layout(std430, binding = 4) coherent buffer Target { uint target[]; };
 #else
-    write(target, readKey(i), 0u);
+layout(std430, binding = 3) readonly buffer Source { uint source[]; };
+layout(std430, binding = 4) writeonly buffer Target { uint target[]; };
 #endif
-}
+// For each job the sums of all digits, then rows of a column for each share, one for each digit.
+#if GLINT_STAGE != 0 && GLINT_STAGE != 4
+layout(std430, binding = 5) buffer Table { uint table[]; };
+#endif
+// How many, how many shares; eight words a job: keys, payload, size, place in scratch memory, first share, shares; then
+// the job of each share.
+#if GLINT_MANY
+layout(std430, binding = 6) coherent buffer Jobs { uint jobs[]; };
+#endif
 
-void clearCounters() {
-    for (uint i = 0u; i < DIGITS; i++) counters[i * GLINT_GROUP + gl_LocalInvocationIndex] = 0u;
-}
+// The most jobs there can be.
+uint jobRoom() { return GLINT_MANY == 1 ? work.capacity / SMALL + 1u : 1u; }
+uint tilesOf(uint size) { return size / TILE + (size % TILE == 0u ? 0u : 1u); }
 
-// The digits of elements in any order.
-void countDigits(uint begin, uint end) {
-    clearCounters();
-    for (uint i = begin + gl_LocalInvocationIndex; i < end; i += GLINT_GROUP)
-        counters[digitOf(readKey(i)) * GLINT_GROUP + gl_LocalInvocationIndex]++;
-    barrier();
-}
+struct Job {
+    uint keys, payload, size, room;
+    uint shares;
+    uint row;  // where its rows begin in the table
+};
 
-// Makes running sums of the counters, by digit and then by thread. The sum of all.
-uint sumCounters() {
-    const uint begin = gl_LocalInvocationIndex * DIGITS;
-    uint sum = 0u;
-    for (uint i = begin; i < begin + DIGITS; i++) sum += counters[i];
-    uint total;
-    sum = sumBefore(sum, total);
-    for (uint i = begin; i < begin + DIGITS; i++) {
-        const uint count = counters[i];
-        counters[i] = sum;
-        sum += count;
-    }
-    barrier();
-    return total;
-}
-
-// Moves the elements to `places`.
-void scatter(uint begin, uint end) {
-    const uint local = gl_LocalInvocationIndex;
-    for (uint tile = begin; tile < end; tile += GLINT_TILE) {
-        const uint first = min(tile + local * GLINT_RUN, end);
-        const uint last = min(first + GLINT_RUN, end);
-        clearCounters();
-        for (uint i = first; i < last; i++) counters[digitOf(readKey(i)) * GLINT_GROUP + local]++;
-        barrier();
-        const uint total = sumCounters();
-        for (uint digit = local; digit < DIGITS; digit += GLINT_GROUP) {
-            const uint start = counters[digit * GLINT_GROUP];
-            const uint stop = digit + 1u < DIGITS ? counters[(digit + 1u) * GLINT_GROUP] : total;
-            offsets[digit] = places[digit] - start;
-            places[digit] += stop - start;
-        }
-        barrier();
-        for (uint i = first; i < last; i++) {
-            const uint digit = digitOf(readKey(i));
-            const uint counter = digit * GLINT_GROUP + local;
-            const uint place = counters[counter];
-            counters[counter] = place + 1u;
-            move(i, offsets[digit] + place);
-        }
-        barrier();
-    }
-}
-
-void copyBack(uint begin, uint end) {
-    for (uint i = begin + gl_LocalInvocationIndex; i < end; i += GLINT_GROUP) move(i, i);
-}
-
-// Whether the region can be sorted; `is_reporter` says it if not.
-bool setRegion(uint i, bool is_reporter) {
-    keys = regions[work.first + 4u * i];
-    payload = regions[work.first + 4u * i + 1u];
-    size = regions[work.first + 4u * i + 2u];
-    room = 0u;
+// Reports what is wrong with a region if it is to.
+bool isSortable(uint keys, uint payload, uint size, bool is_reporter) {
     if (!isInside(keys, size) || (GLINT_PAYLOAD != 0 && !isInside(payload, size))) {
         if (is_reporter) atomicAdd(report[0], 1u);
         return false;
@@ -136,101 +55,119 @@ bool setRegion(uint i, bool is_reporter) {
     return true;
 }
 
-void setPass(uint pass_shift, uint bits, bool flipped) {
-    shift = pass_shift;
-    mask = (1u << bits) - 1u;
-    is_flipped = flipped;
-    is_first = pass_shift == 0u;
+#if GLINT_MANY
+
+uint jobCount() { return jobs[0]; }
+uint shareCount() { return jobs[1]; }
+uint jobOfShare(uint share) { return jobs[2u + 8u * jobRoom() + share]; }
+
+Job findJob(uint i) {
+    const uint word = 2u + 8u * i;
+    const uint first_share = jobs[word + 4u];
+    return Job(jobs[word], jobs[word + 1u], jobs[word + 2u], jobs[word + 3u], jobs[word + 5u],
+               DIGITS * (jobRoom() + first_share * COLUMNS));
 }
 
-#if GLINT_STAGE == 4
-
-// Takes scratch memory for the region. Where it lies makes no difference to the result.
-bool takeRoom() {
-    if (gl_LocalInvocationIndex == 0u) {
-        uint seen = report[3], before;
-        taken = ~0u;
-        while (size <= work.capacity - seen) {
-            before = seen;
-            seen = atomicCompSwap(report[3], before, before + size);
-            if (seen == before) {
-                taken = before;
-                break;
-            }
-        }
-        if (taken == ~0u) atomicAdd(report[1], 1u);
-    }
-    barrier();
-    room = taken;
-    barrier();
-    return room != ~0u;
-}
-
-void sortRegion() {
-    bool flipped = false;
-    for (uint begin = 0u; begin < work.bits; begin += GLINT_DIGIT) {
-        setPass(begin, min(uint(GLINT_DIGIT), work.bits - begin), flipped);
-        countDigits(0u, size);
-        sumCounters();
-        for (uint digit = gl_LocalInvocationIndex; digit < DIGITS; digit += GLINT_GROUP)
-            places[digit] = counters[digit * GLINT_GROUP];
-        barrier();
-        scatter(0u, size);
-        memoryBarrierBuffer();
-        barrier();
-        flipped = !flipped;
-    }
-    if (!flipped) return;
-    is_flipped = true;
-    is_first = false;
-    copyBack(0u, size);
-}
-
-void main() {
-    if (gl_WorkGroupID.x >= work.groups) return;
-    const uint count = regionCount();
-    for (uint i = gl_WorkGroupID.x; i < count; i += work.groups)
-        if (setRegion(i, gl_LocalInvocationIndex == 0u) && takeRoom()) sortRegion();
-}
+uint shareOfJob(uint share, uint job) { return share - jobs[2u + 8u * job + 4u]; }
 
 #else
 
-void main() {
-    const uint group = gl_WorkGroupID.x;
-    if (group >= work.groups || regionCount() == 0u) return;
-    if (!setRegion(0u, GLINT_STAGE == 0 && work.shift == 0u && gl_GlobalInvocationID.x == 0u)) return;
-    setPass(work.shift, work.bits, work.flipped != 0u);
-    const uint local = gl_LocalInvocationIndex;
-    const uint share = shareOf(size);
-    const uint begin = min(group * share, size), end = min((group + 1u) * share, size);
-#if GLINT_STAGE == 0
-    countDigits(begin, end);
-    for (uint digit = local; digit < DIGITS; digit += GLINT_GROUP) {
-        uint sum = 0u;
-        for (uint i = 0u; i < GLINT_GROUP; i++) sum += counters[digit * GLINT_GROUP + i];
-        sums[digit * work.groups + group] = sum;
-    }
-#elif GLINT_STAGE == 1
-    const uint all = DIGITS * work.groups;
-    const uint run = (all + GLINT_GROUP - 1u) / GLINT_GROUP;
-    const uint first = min(local * run, all), last = min(first + run, all);
-    uint sum = 0u;
-    for (uint i = first; i < last; i++) sum += sums[i];
-    uint total;
-    sum = sumBefore(sum, total);
-    for (uint i = first; i < last; i++) {
-        const uint value = sums[i];
-        sums[i] = sum;
-        sum += value;
-    }
-#elif GLINT_STAGE == 2
-    for (uint digit = local; digit < DIGITS; digit += GLINT_GROUP) places[digit] = sums[digit * work.groups + group];
-    barrier();
-    scatter(begin, end);
-#else
-    is_first = false;
-    copyBack(begin, end);
+uint shareCount() {
+    const bool is_reporter = GLINT_STAGE == 1 && work.shift == 0u && gl_GlobalInvocationID.x == 0u;
+    if (regionCount(is_reporter) == 0u) return 0u;
+    const uint keys = regions[work.first], payload = regions[work.first + 1u], size = regions[work.first + 2u];
+    return isSortable(keys, payload, size, is_reporter) ? min(tilesOf(size), work.groups) : 0u;
+}
+uint jobCount() { return shareCount() == 0u ? 0u : 1u; }
+uint jobOfShare(uint share) { return 0u; }
+
+Job findJob(uint i) {
+    const uint size = regions[work.first + 2u];
+    return Job(regions[work.first], regions[work.first + 1u], size, 0u, min(tilesOf(size), work.groups), DIGITS);
+}
+
+uint shareOfJob(uint share, uint job) { return share; }
+
 #endif
+
+uint digitOf(uint key, uint shift, uint mask) { return (key >> shift) & mask; }
+
+#if GLINT_TILES
+#include <glint/parallel/sort_tiles.h>
+#else
+#include <glint/parallel/sort_runs.h>
+#endif
+
+#if GLINT_STAGE == 0
+
+// Takes scratch memory for a region, ~0 if none is left. Where it lies makes no difference to the result.
+uint takeRoom(uint size) {
+    uint seen = report[3];
+    while (size <= work.capacity - seen) {
+        const uint before = seen;
+        seen = atomicCompSwap(report[3], before, before + size);
+        if (seen == before) return before;
+    }
+    atomicAdd(report[1], 1u);
+    return ~0u;
+}
+
+void main() {
+    const uint count = regionCount(gl_GlobalInvocationID.x == 0u);
+    for (uint i = gl_GlobalInvocationID.x; i < count; i += gl_NumWorkGroups.x * GLINT_GROUP) {
+        const uint keys = regions[work.first + 4u * i], payload = regions[work.first + 4u * i + 1u];
+        const uint size = regions[work.first + 4u * i + 2u];
+        if (!isSortable(keys, payload, size, true) || size <= SMALL) continue;
+        const uint room = takeRoom(size);
+        if (room == ~0u) continue;
+        const uint shares = tilesOf(size);
+        const uint job = atomicAdd(jobs[0], 1u);
+        const uint first_share = atomicAdd(jobs[1], shares);
+        const uint word = 2u + 8u * job;
+        jobs[word] = keys;
+        jobs[word + 1u] = payload;
+        jobs[word + 2u] = size;
+        jobs[word + 3u] = room;
+        jobs[word + 4u] = first_share;
+        jobs[word + 5u] = shares;
+        for (uint share = 0u; share < shares; share++) jobs[2u + 8u * jobRoom() + first_share + share] = job;
+    }
+}
+
+#elif GLINT_STAGE == 2
+
+void main() { scanRows(DIGITS * jobCount()); }
+
+#elif GLINT_STAGE == 4
+
+void main() {
+    const uint count = regionCount(false);
+    for (uint i = gl_WorkGroupID.x; i < count; i += gl_NumWorkGroups.x) {
+        const uint keys = regions[work.first + 4u * i], payload = regions[work.first + 4u * i + 1u];
+        const uint size = regions[work.first + 4u * i + 2u];
+        if (size != 0u && size <= SMALL && isSortable(keys, payload, size, false)) sortSmall(keys, payload, size);
+    }
+}
+
+#else
+
+void main() {
+    const uint all = shareCount();
+    for (uint share = gl_WorkGroupID.x; share < all; share += gl_NumWorkGroups.x) {
+        const uint index = jobOfShare(share);
+        const Job job = findJob(index);
+        const uint own = shareOfJob(share, index);
+        // Offsets into source and target.
+        const bool is_flipped = work.flipped != 0u;
+        const uvec2 in_data = uvec2(job.keys, job.payload), in_scratch = uvec2(job.room, work.capacity + job.room);
+        const uvec2 from = is_flipped ? in_scratch : in_data, to = is_flipped ? in_data : in_scratch;
+        const uint mask = (1u << work.bits) - 1u;
+#if GLINT_STAGE == 1
+        countShare(job, own, from, work.shift, mask);
+#else
+        moveShare(job, index, own, from, to, work.shift, mask);
+#endif
+    }
 }
 
 #endif

@@ -274,12 +274,22 @@ TEST_F(RadixSortTest, LeavesWhatTheDeviceGetsWrong) {
         expectValues(device, run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, regions); }), values);
         EXPECT_THAT(sort.check(), HasErrorId("parallel.outside"));
     }
-    // Two regions of 200 where there is room for one: either may be the one that is sorted.
-    const std::vector<Region> two = {{0, 200, 200, 0}, {500, 750, 200, 0}};
+    // Two large regions where there is room for one: either may be the one that is sorted.
+    const std::vector<uint32_t> large = makeValues(80000, Keys::Random, 5);
+    const std::vector<Region> two = {{0, 20000, 20000, 0}, {40000, 60000, 20000, 0}};
     const Buffer both = device.createBuffer(Buffer::FlagStorage, std::span(two));
-    ASSERT_THAT(sort.create(device, RadixSort::FlagMultiple, 399), IsOk());
-    run([&](Compute& c, const Buffer& b) { sort.dispatchIndirect(c, b, 2, both); });
+    ASSERT_THAT(sort.create(device, RadixSort::FlagMultiple, 39999), IsOk());
+    const Buffer halves = device.createBuffer(Buffer::FlagStorage, std::span(large));
+    Compute list = device.createCompute();
+    sort.dispatchIndirect(list, halves, 2, both);
+    EXPECT_THAT(device.submit(list), IsOk());
     EXPECT_THAT(sort.check(), HasErrorId("parallel.room"));
+    std::vector<uint32_t> first = large, second = large;
+    sortManyOnHost(first, std::span(two).first(1), 32);
+    sortManyOnHost(second, std::span(two).last(1), 32);
+    const auto halved = device.read<uint32_t>(halves);
+    ASSERT_TRUE(halved) << halved.error().text();
+    EXPECT_TRUE(*halved == first || *halved == second);
     // Overlapping regions end in any order, and nothing outside of them changes.
     const std::vector<Region> overlapping(64, Region{100, 150, 90, 0});
     const Buffer many = device.createBuffer(Buffer::FlagStorage, std::span(overlapping));

@@ -17,12 +17,25 @@ struct ParallelWork {
     uint32_t first = 0;
     uint32_t count = 1;
     uint32_t count_word = ~0u;
+    uint32_t words = 0;
     uint32_t groups = 0;
     uint32_t capacity = 0;
     uint32_t shift = 0;
     uint32_t bits = 0;
     uint32_t flipped = 0;
 };
+
+/// How groups share their elements, which `shaders/parallel/common.h` explains: by tiles on GPUs, by runs on CPUs.
+struct ParallelForm {
+    bool tiles = false;
+    uint32_t group = 0;     ///< threads
+    uint32_t most = 0;      ///< threads of the largest groups
+    uint32_t subgroup = 0;  ///< the smallest there are
+    bool is_wide = false;   ///< subgroups may have more than 32 threads
+};
+
+/// Of the device, or as $GLINT_PARALLEL ("tiles", "runs") says.
+ParallelForm parallelFormOf(const Device& device);
 
 /// Regions of four words, of the host or of the device.
 class ParallelRegions {
@@ -37,12 +50,12 @@ public:
         ParallelWork work;
     };
 
-    /// `groups` 0: as many as suit the device. Room for `regions` of the host.
-    Status create(const Device& device, std::string_view name, uint32_t groups, uint32_t regions, Where where);
+    /// `groups` 0: as many as suit the device, which are `gpu_groups` on GPUs. Room for `regions` of the host.
+    Status create(const Device& device, std::string_view name, uint32_t groups, uint32_t gpu_groups, uint32_t regions,
+                  Where where);
 
     uint32_t groups() const { return groups_; }
-    /// CPUs pay for each barrier of a group, GPUs for idle threads.
-    bool isCpu() const { return device_.getInfo().cpu; }
+    const ParallelForm& form() const { return form_; }
     const Buffer& report() const { return report_; }
 
     /// Each gives a source, or fails the list.
@@ -54,7 +67,8 @@ public:
     /// "parallel.range" if the region is not within the buffer.
     Status checkRange(const Buffer& data, uint64_t offset, uint64_t size, Where where) const;
 
-    void bind(Compute& compute, const Kernel& kernel, const Buffer& data, const Source& source) const;
+    /// Sets what all kernels have: regions, counts and report, in slots 0 to 2.
+    void bind(Compute& compute, const Kernel& kernel, const Source& source) const;
     void run(Compute& compute, const ParallelWork& work, const Kernel& kernel, uint32_t groups, Where where) const;
 
     Status check(Where where) const;
@@ -62,11 +76,12 @@ public:
     /// What a use before create() fails with.
     static Error uncreated(const char* what, Where where);
     Buffer createBuffer(uint64_t size, std::string_view name, Where where) const;
-    /// Of a file of shaders/parallel.
-    Expected<Kernel> createKernel(std::string_view file, std::string_view macros, Where where) const;
+    /// Of a file of shaders/parallel, in the device's form, with groups of `group` threads.
+    Expected<Kernel> createKernel(std::string_view file, std::string_view macros, uint32_t group, Where where) const;
 
 private:
     Device device_;
+    ParallelForm form_;
     uint32_t groups_ = 0;
     uint32_t room_ = 0;
     Buffer regions_;

@@ -79,6 +79,7 @@ Benchmark traversalOffsetBenchmark();
 Benchmark traversalHelloBenchmark();
 Benchmark parallelBenchmark();
 Benchmark splatLoadBenchmark();
+Benchmark splatFilesBenchmark();
 Benchmark splatAccuracyBenchmark();
 Benchmark splatTradeoffsBenchmark();
 Benchmark splatNeedlesBenchmark();

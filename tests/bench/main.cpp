@@ -51,12 +51,12 @@ int main(int argc, char** argv) {
     int found = 0;
     // The compiler's first shader is timed before any other benchmark compiles one.
     const Benchmark benchmarks[] = {
-        shaderCompileBenchmark(),    dispatchBenchmark(),        drawBenchmark(),         warmFrameBenchmark(),
-        tracingFrameBenchmark(),     startupBenchmark(),         memoryBenchmark(),       tracingSoftwareBenchmark(),
-        tracingBuildBenchmark(),     tracingDeviceBenchmark(),   tracingLeaksBenchmark(), tracingDriverBenchmark(),
-        tracingTradeoffsBenchmark(), tracingGpuBenchmark(),      castBenchmark(),         castMemoryBenchmark(),
-        traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),     splatAccuracyBenchmark(),
-        splatLoadBenchmark(),        splatTradeoffsBenchmark(),  splatNeedlesBenchmark()};
+        shaderCompileBenchmark(),    dispatchBenchmark(),        drawBenchmark(),           warmFrameBenchmark(),
+        tracingFrameBenchmark(),     startupBenchmark(),         memoryBenchmark(),         tracingSoftwareBenchmark(),
+        tracingBuildBenchmark(),     tracingDeviceBenchmark(),   tracingLeaksBenchmark(),   tracingDriverBenchmark(),
+        tracingTradeoffsBenchmark(), tracingGpuBenchmark(),      castBenchmark(),           castMemoryBenchmark(),
+        traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),       splatAccuracyBenchmark(),
+        splatLoadBenchmark(),        splatFilesBenchmark(),      splatTradeoffsBenchmark(), splatNeedlesBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

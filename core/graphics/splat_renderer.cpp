@@ -171,13 +171,19 @@ Status SplatRenderer::State::create(Where where) {
     options.max_degree = std::min(options.max_degree, Splats::max_degree);
     const uint32_t pixels = options.tile_width * options.tile_height;
     if (options.threads == 0)
-        options.threads =
-            options.method == MethodPlain ? std::min(pixels, 256u) : std::max(pixels / 64, is_cpu ? 8u : 32u);
+        options.threads = options.method == MethodPlain ? std::min(pixels, 256u)
+                          : is_cpu                      ? std::max(pixels / 64, 8u)
+                                                        : 4 * std::max(options.tile_width, 16u);
     if (options.threads > std::min(pixels, features.maxGroupThreads) || options.threads < pixels / 64)
         return makeError(where, ErrorCode::OutOfRange, "splats.options",
                          "splat renderer: {} threads for the {} pixels of a tile; there have to be {} to {}",
                          options.threads, pixels, std::max(pixels / 64, 8u),
                          std::min({pixels, features.maxGroupThreads, 256u}));
+    if (options.method == MethodTiles && options.threads >= 32 && options.threads < 4 * options.tile_width)
+        return makeError(where, ErrorCode::OutOfRange, "splats.options",
+                         "splat renderer: {} threads for a tile {} pixels wide; from 32 on there have to be four for "
+                         "each column",
+                         options.threads, options.tile_width);
     // On CPUs a barrier costs for each subgroup.
     is_wide = options.method == MethodTiles ? options.threads >= 32 : !is_cpu;
     group = is_wide ? block : 8;
@@ -422,7 +428,7 @@ Status SplatRenderer::State::gather(Compute& compute, const Frame& frame, Where 
 Status SplatRenderer::State::blend(Compute& compute, const Frame& frame, const Outputs& outputs, Where where) {
     const bool has_depth = static_cast<bool>(outputs.depth), has_rest = static_cast<bool>(outputs.transmittance);
     const bool is_shared = is_wide && options.method == MethodTiles;
-    const uint32_t columns = std::max(options.tile_width / options.threads, 1u);
+    const uint32_t columns = is_shared ? 1 : std::max(options.tile_width / options.threads, 1u);
     const uint32_t rows = options.tile_width * options.tile_height / options.threads / columns;
     const Expected<Kernel> kernel = this->kernel(
         "blend",

@@ -43,8 +43,9 @@ public:
     struct Options {
         uint32_t tile_width = 0;  ///< 8, 16, 32 or 64 pixels; 0: what suits the device, and both then
         uint32_t tile_height = 0;
-        /// That share a tile of MethodTiles: a power of two from 8 to 256, with at most 64 pixels each. From 32 on all
-        /// passes take the form for GPUs, which share more and wait for one another. 0: what suits the device.
+        /// That share a tile of MethodTiles: a power of two from 8 to 256, with at most 64 pixels each. From 32 on,
+        /// when there have to be four for each column, all passes take the form for GPUs, which share more and wait for
+        /// one another. 0: what suits the device.
         uint32_t threads = 0;
         float near = 0.2f;                 ///< splats whose centre has less view depth are left out; more than 0
         float alpha_cut = 1.0f / 255.0f;   ///< where its alpha is less a splat is left out; 1e-6 to 0.5

@@ -1,9 +1,10 @@
 // Blends the list of each tile, a group a tile; each thread blends GLINT_COLUMNS * GLINT_ROWS of its pixels.
-// GLINT_SHARED: the group reads the list together, a splat a thread, through shared memory. GLINT_DEPTH,
-// GLINT_TRANSMITTANCE: further outputs.
+// GLINT_SHARED: the group reads the list together, a splat a thread, through shared memory, and finds which of them reach
+// the part of the tile that each 32 threads have. GLINT_DEPTH, GLINT_TRANSMITTANCE: further outputs.
 #pragma once
 
 #include <glint/splats/footprints.h>
+#include <glint/splats/tiles.h>
 
 layout(local_size_x = GLINT_GROUP) in;
 
@@ -18,30 +19,38 @@ layout(binding = 5) writeonly uniform image2D picture;
 layout(binding = 7) writeonly uniform image2D transmittance_picture;
 #endif
 
-// Threads along x; each has GLINT_COLUMNS columns at this distance, and rows that follow one another.
+#if GLINT_SHARED
+// Parts of 8 pixels in width, 32 threads each.
+const uint PARTS = GLINT_GROUP / 32u, PARTS_X = GLINT_TILE_X / 8u;
+const uint PART_Y = 4u * GLINT_ROWS;
+const uint WORDS = GLINT_GROUP / 32u;
+const uint THREADS_X = 8u;
+#else
+// Threads along x; each has GLINT_COLUMNS columns at this distance.
 const uint THREADS_X = GLINT_TILE_X / GLINT_COLUMNS;
+#endif
 // Beyond every logarithm of alpha.
 const float NEVER = 1e30;
 
 #if GLINT_SHARED
 // Batches alternate between two places, so that one barrier each suffices: who writes to a place has passed the barrier
-// that all have reached after reading it.
+// that all have reached after reading it. What is cleared between takes turns of three.
 shared vec2 centers[2][GLINT_GROUP];
 shared vec4 conics[2][GLINT_GROUP];
 shared vec4 paints[2][GLINT_GROUP];
 shared uint is_open[3];
+// Which splats of a batch reach each part: a bit each.
+shared uint reaching[3][PARTS * WORDS];
 #endif
 
-// `conic`: shear, scale_x, scale_y, log_opacity. `paint`: color and depth.
-void read(uint entry, out vec2 center, out vec4 conic, out vec4 paint) {
+Footprint read(uint entry, out float depth) {
     const uint splat = entries[frame.capacity + entry];
-    const Footprint f = readFootprint(splat);
-    center = f.center;
-    conic = vec4(f.shear, f.scale_x, f.scale_y, f.log_opacity);
-    paint = vec4(unpackColor(f.color), 0.0);
 #if GLINT_DEPTH
-    paint.a = uintBitsToFloat(infos[splat].x);
+    depth = uintBitsToFloat(infos[splat].x);
+#else
+    depth = 0.0;
 #endif
+    return readFootprint(splat);
 }
 
 // One function: what each pixel has must stay in registers.
@@ -49,9 +58,12 @@ void main() {
     const uint tile = groupIndex();
     if (tile >= frame.tiles.x * frame.tiles.y) return;
     const uint local = gl_LocalInvocationIndex;
-    const uvec2 thread = uvec2(local % THREADS_X, local / THREADS_X);
-    const uvec2 corner = uvec2(tile % frame.tiles.x * GLINT_TILE_X + thread.x,
-                               tile / frame.tiles.x * GLINT_TILE_Y + thread.y * GLINT_ROWS);
+    const uvec2 origin = uvec2(tile % frame.tiles.x * GLINT_TILE_X, tile / frame.tiles.x * GLINT_TILE_Y);
+    uvec2 corner = origin + uvec2(local % THREADS_X, local / THREADS_X * GLINT_ROWS);
+#if GLINT_SHARED
+    const uint part = local / 32u;
+    corner = origin + uvec2(part % PARTS_X * 8u + local % 8u, part / PARTS_X * PART_Y + local % 32u / 8u * GLINT_ROWS);
+#endif
     const vec2 pixel = vec2(corner) + 0.5 - frame.half_size;
 
     vec3 colors[GLINT_COLUMNS][GLINT_ROWS];
@@ -75,71 +87,90 @@ void main() {
         }
 
     const uvec2 range = ranges[tile];
-    vec2 center = vec2(0.0);
-    vec4 conic = vec4(0.0), paint = vec4(0.0);
+    vec2 center;
+    vec4 conic, paint;  // shear, scale_x, scale_y, log_opacity; color, depth
 #if GLINT_SHARED
+    Footprint next;
+    float next_depth;
     if (local < 3u) is_open[local] = 0u;
-    if (range.x + local < range.y) read(range.x + local, center, conic, paint);
+    for (uint i = local; i < 3u * PARTS * WORDS; i += GLINT_GROUP) reaching[i % 3u][i / 3u] = 0u;
+    if (range.x + local < range.y) next = read(range.x + local, next_depth);
     barrier();
     uint batch = 0u;
     for (uint begin = range.x; begin < range.y; begin += GLINT_GROUP) {
-        const uint place = batch & 1u;
-        centers[place][local] = center;
-        conics[place][local] = conic;
-        paints[place][local] = paint;
-        if (open != 0u) is_open[batch % 3u] = 1u;
+        const uint place = batch & 1u, third = batch % 3u;
+        if (begin + local < range.y) {
+            centers[place][local] = next.center;
+            conics[place][local] = vec4(next.shear, next.scale_x, next.scale_y, next.log_opacity);
+            paints[place][local] = vec4(unpackColor(next.color), next_depth);
+            const float left = float(origin.x) + 0.5 - frame.half_size.x;
+            const float height = heightOf(next);
+            for (uint row = 0u; row < PARTS / PARTS_X; row++) {
+                const float top = float(origin.y + row * PART_Y) + 0.5 - frame.half_size.y - next.center.y;
+                const float bottom = top + float(PART_Y - 1u);
+                if (top > height || bottom < -height) continue;
+                const vec2 span = next.center.x + widthBetween(next, top, bottom);
+                [[unroll]] for (uint x = 0u; x < PARTS_X; x++)
+                    if (span.x <= left + float(8u * x + 7u) && span.y >= left + float(8u * x))
+                        atomicOr(reaching[third][(row * PARTS_X + x) * WORDS + local / 32u], 1u << (local % 32u));
+            }
+        }
+        if (open != 0u) is_open[third] = 1u;
         barrier();
-        if (is_open[batch % 3u] == 0u) break;
-        if (local == 0u) is_open[(batch + 2u) % 3u] = 0u;
+        if (is_open[third] == 0u) break;
         batch++;
-        const uint count = min(range.y - begin, GLINT_GROUP);
+        const uint after_next = (third + 2u) % 3u;
+        if (local == 0u) is_open[after_next] = 0u;
+        for (uint i = local; i < PARTS * WORDS; i += GLINT_GROUP) reaching[after_next][i] = 0u;
         // While this batch is blended the next one is on its way.
-        vec2 next_center = vec2(0.0);
-        vec4 next_conic = vec4(0.0), next_paint = vec4(0.0);
-        if (begin + GLINT_GROUP + local < range.y) read(begin + GLINT_GROUP + local, next_center, next_conic, next_paint);
-        for (uint i = 0u; i < count; i++) {
-            center = centers[place][i];
-            conic = conics[place][i];
-            paint = paints[place][i];
+        if (begin + GLINT_GROUP + local < range.y) next = read(begin + GLINT_GROUP + local, next_depth);
+        for (uint word = 0u; word < WORDS; word++) {
+            uint left = reaching[third][part * WORDS + word];
+            while (left != 0u) {
+                const uint i = word * 32u + uint(findLSB(left));
+                left &= left - 1u;
+                center = centers[place][i];
+                conic = conics[place][i];
+                paint = paints[place][i];
 #else
     {
         for (uint i = range.x; i < range.y && open != 0u; i++) {
-            read(i, center, conic, paint);
+            {
+                const Footprint f = read(i, paint.a);
+                center = f.center;
+                conic = vec4(f.shear, f.scale_x, f.scale_y, f.log_opacity);
+                paint.rgb = unpackColor(f.color);
 #endif
-            [[unroll]] for (uint c = 0u; c < GLINT_COLUMNS; c++) {
-                const vec2 offset = pixel + vec2(c * THREADS_X, 0.0) - center;
-                const float across = conic.y * offset.x;
-                const float most = conic.w - across * across;
-                float along = conic.z * (offset.y - conic.x * offset.x);
+                [[unroll]] for (uint c = 0u; c < GLINT_COLUMNS; c++) {
+                    const vec2 offset = pixel + vec2(c * THREADS_X, 0.0) - center;
+                    const float across = conic.y * offset.x;
+                    const float most = conic.w - across * across;
+                    float along = conic.z * (offset.y - conic.x * offset.x);
 #if !GLINT_SHARED
-                // Lanes that are idle together skip the column.
-                const float last = along + float(GLINT_ROWS - 1) * conic.z;
-                const float nearest = along > 0.0 ? along : min(last, 0.0);
-                if (most - nearest * nearest >= frame.log_cut)
+                    // Lanes that are idle together skip the column.
+                    const float last = along + float(GLINT_ROWS - 1) * conic.z;
+                    const float nearest = along > 0.0 ? along : min(last, 0.0);
+                    if (most - nearest * nearest >= frame.log_cut)
 #endif
-                [[unroll]] for (uint r = 0u; r < GLINT_ROWS; r++) {
-                    const float power = most - along * along;
-                    if (power >= cuts[c][r]) {
-                        const float weight = transmittances[c][r] * exp2(power);
-                        colors[c][r] += weight * paint.rgb;
+                    [[unroll]] for (uint r = 0u; r < GLINT_ROWS; r++) {
+                        const float power = most - along * along;
+                        if (power >= cuts[c][r]) {
+                            const float weight = transmittances[c][r] * exp2(power);
+                            colors[c][r] += weight * paint.rgb;
 #if GLINT_DEPTH
-                        depths[c][r] += weight * paint.a;
+                            depths[c][r] += weight * paint.a;
 #endif
-                        transmittances[c][r] -= weight;
-                        if (transmittances[c][r] <= frame.stop) {
-                            cuts[c][r] = NEVER;
-                            open--;
+                            transmittances[c][r] -= weight;
+                            if (transmittances[c][r] <= frame.stop) {
+                                cuts[c][r] = NEVER;
+                                open--;
+                            }
                         }
+                        along += conic.z;
                     }
-                    along += conic.z;
                 }
             }
         }
-#if GLINT_SHARED
-        center = next_center;
-        conic = next_conic;
-        paint = next_paint;
-#endif
     }
 
     [[unroll]] for (uint c = 0u; c < GLINT_COLUMNS; c++)

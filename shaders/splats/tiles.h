@@ -38,21 +38,23 @@ uvec2 tileSpan(Footprint f, uint row) {
 
 #else
 
+// From the center to the ellipse's highest point.
+float heightOf(Footprint f) {
+    const float extent = sqrt(f.log_opacity - frame.log_cut) * length(vec2(1.0 / f.scale_y, f.shear / f.scale_x));
+    return extent + marginOf(extent + abs(f.center.y));
+}
+
 // Rows of tiles.
 uvec2 tileRows(Footprint f) {
-    const float limit = f.log_opacity - frame.log_cut;
-    if (limit < 0.0) return uvec2(0u);
-    float extent = sqrt(limit) * length(vec2(1.0 / f.scale_y, f.shear / f.scale_x));
-    extent += marginOf(extent + abs(f.center.y));
+    const float extent = heightOf(f);
     return tilesIn(f.center.y - extent, f.center.y + extent, frame.half_size.y, TILE_Y, frame.tiles.y);
 }
 
-// Tiles of a row. The part of the ellipse within the row is convex: it begins and ends at the ellipse's own leftmost
-// and rightmost points where they are in the row, else where the ellipse crosses the edge that is nearer to them.
-uvec2 tileSpan(Footprint f, uint row) {
+// From left to right, in pixels from the center: the part of the ellipse between two lines, that there is one. It is
+// convex: it begins and ends at the ellipse's own leftmost and rightmost points where they are between the lines, else
+// where the ellipse crosses the line that is nearer to them.
+vec2 widthBetween(Footprint f, float top, float bottom) {
     const float limit = f.log_opacity - frame.log_cut;
-    const float top = float(row) * TILE_Y + 0.5 - frame.half_size.y - f.center.y;
-    const float bottom = top + TILE_Y - 1.0;
     const float right = sqrt(limit) / f.scale_x;
     const float height = f.shear * right;  // of the rightmost point
     const vec2 edge = clamp(vec2(-height, height), vec2(top), vec2(bottom));
@@ -65,7 +67,13 @@ uvec2 tileSpan(Footprint f, uint row) {
     if (edge.x == -height) span.x = -right;
     if (edge.y == height) span.y = right;
     const float margin = marginOf(abs(f.center.x) + max(abs(middle.x) + root.x, abs(middle.y) + root.y));
-    span += f.center.x + vec2(-margin, margin);
+    return span + vec2(-margin, margin);
+}
+
+// Tiles of a row.
+uvec2 tileSpan(Footprint f, uint row) {
+    const float top = float(row) * TILE_Y + 0.5 - frame.half_size.y - f.center.y;
+    const vec2 span = f.center.x + widthBetween(f, top, top + TILE_Y - 1.0);
     return tilesIn(span.x, span.y, frame.half_size.x, TILE_X, frame.tiles.x);
 }
 

@@ -74,7 +74,7 @@ void run(Report& report) {
         fmt::format("{}.\n\n| scene | kind of error | rmse | largest | PSNR, dB | pixels above 1/255 |\n"
                     "|---|---|---|---|---|---|\n",
                     deviceName(device));
-    for (const SplatScene& scene : splatViews(device)) {
+    for (const SplatScene& scene : splatViews()) {
         const auto errors = errorsOf(drawer, scene);
         add(report, device, scene.name, errors);
         for (size_t kind = 0; kind < KindCount; kind++)

@@ -141,23 +141,23 @@ void compareTiles(Report& report, const Device& device, std::span<const SplatSce
 }
 
 void compareStorages(Report& report, const Device& device, std::span<const SplatScene> scenes) {
-    std::string table =
-        fmt::format("{}; rmse, and time of drawing over that of float32 with all harmonics.\n\n"
-                    "| scene | storage | degree | bytes a splat | rmse | time |\n|---|---|---|---|---|---|\n",
-                    deviceName(device));
+    struct Row {
+        std::string storage;
+        uint32_t degree = 0;
+        double bytes = 0.0, rmse = 0.0;
+        double drawn_rmse = 0.0, time = 0.0;  ///< of the renderer's own storages
+    };
+    std::string table = fmt::format(
+        "{}; times over that of float32 with all harmonics.\n\n"
+        "| scene | storage | degree | bytes a splat | rmse | drawn: rmse | time |\n|---|---|---|---|---|---|---|\n",
+        deviceName(device));
+    SplatDrawer drawer(device);
     for (const SplatScene& scene : scenes) {
         const SplatPicture truth = test::referenceOf(scene, {});
-        struct Row {
-            std::string storage;
-            uint32_t degree;
-            double bytes, rmse;
-        };
+        const SplatPicture cut_truth = test::referenceOf(scene, drawer.settings());
         std::vector<Row> rows;
-        SplatDrawer drawer(device);
-        std::vector<std::function<void()>> draws;  // of the first rows: the renderer's own storages
-        std::string curves;
+        std::vector<std::function<void()>> draws;  // of the first rows
         for (const SplatStorage& storage : splatStorages()) {
-            curves += fmt::format("# {}: degree, bytes a splat, rmse\n", storage.name);
             const uint32_t most = storage.name == ".splat" ? 0 : scene.splats.degree;
             for (uint32_t degree = most + 1; degree-- > 0;) {
                 const StoredSplats stored = storage.store(withDegree(scene.splats, degree));
@@ -166,9 +166,6 @@ void compareStorages(Report& report, const Device& device, std::span<const Splat
                     test::renderSplats(scene.camera, scene.width, scene.height, {&instance, 1});
                 const double rmse = test::comparePictures(picture, truth).rmse;
                 rows.push_back({storage.name, degree, stored.bytes, rmse});
-                // What is exact has no place on a logarithmic axis.
-                curves +=
-                    fmt::format("{} {} {}\n", degree, stored.bytes, rmse > 0.0 ? fmt::format("{:.4e}", rmse) : "NaN");
                 if (storage.name == "default" && degree == most)
                     report.add("splat.tradeoff." + scene.name + ".storage_rmse", rmse, "of a peak of 1",
                                "float32 storage", "float64 on the host");
@@ -177,14 +174,23 @@ void compareStorages(Report& report, const Device& device, std::span<const Splat
                 const SplatModel model(device, stored.splats, kind);
                 draws.push_back([&drawer, &scene, model] { drawer.draw(scene, model); });
                 draws.back()();
+                rows.back().drawn_rmse = test::comparePictures(drawer.picture(), cut_truth).rmse;
             }
-            curves += "\n\n";
         }
         const std::vector<double> times = bestTimes(draws);
-        for (size_t i = 0; i < rows.size(); i++)
-            table += fmt::format("| {} | {} | {} | {} | {} | {} |\n", scene.name, rows[i].storage, rows[i].degree,
-                                 rows[i].bytes, rows[i].rmse > 0.0 ? fmt::format("{:.1e}", rows[i].rmse) : "0",
-                                 i < times.size() ? fmt::format("{:.3f}", times[i] / times[0]) : "");
+        for (size_t i = 0; i < times.size(); i++) rows[i].time = times[i] / times[0];
+
+        std::string curves = "# degree, bytes a splat, rmse, rmse of what is drawn, time over that of the first\n";
+        for (size_t i = 0; i < rows.size(); i++) {
+            const Row& row = rows[i];
+            if (i > 0 && row.storage != rows[i - 1].storage) curves += "\n\n";
+            // What is exact has no place on a logarithmic axis.
+            curves += fmt::format("{} {} {} {:.4e} {:.4f}\n", row.degree, row.bytes,
+                                  row.rmse > 0.0 ? fmt::format("{:.4e}", row.rmse) : "NaN", row.drawn_rmse, row.time);
+            table += fmt::format("| {} | {} | {} | {} | {} |", scene.name, row.storage, row.degree, row.bytes,
+                                 row.rmse > 0.0 ? fmt::format("{:.1e}", row.rmse) : "0");
+            table += row.time > 0.0 ? fmt::format(" {:.1e} | {:.3f} |\n", row.drawn_rmse, row.time) : "  |  |\n";
+        }
         check(writeTextFile(report.folder() / ("splat_storage_" + scene.name + ".dat"), curves));
     }
     fmt::print("{}\n", table);
@@ -193,7 +199,7 @@ void compareStorages(Report& report, const Device& device, std::span<const Splat
 
 void run(Report& report) {
     const Device device = createDevice();
-    const std::vector<SplatScene> scenes = splatViews(device);
+    const std::vector<SplatScene> scenes = splatViews();
     compareCutOffs(report, device, scenes);
     compareStorages(report, device, scenes);
     compareTiles(report, device, scenes);

@@ -66,13 +66,13 @@ StoredSplats asDotSplat(const Splats& splats) {
 
 }  // namespace
 
-std::vector<test::SplatScene> splatViews(const Device& device) {
+std::vector<test::SplatScene> splatViews() {
     std::vector<test::SplatScene> views;
     if (test::splatsPath().empty())
         fmt::print("  left out: the real scene, which GLINT_SPLATS=FILE.ply names\n");
     else
         views.push_back(std::move(*check(test::realSplatScene(480, 270))));
-    views.push_back(test::meshScene(device, 50000, 32, 480, 270));
+    views.push_back(test::meshScene(createDevice(), 50000, 32, 480, 270));
     return views;
 }
 

@@ -13,7 +13,7 @@
 namespace glint::bench {
 
 /// The scenes of figures, "playbot" if $GLINT_SPLATS names it and "mesh", with pictures of 480 x 270.
-std::vector<test::SplatScene> splatViews(const Device& device);
+std::vector<test::SplatScene> splatViews();
 
 /// Splats as something has stored them.
 struct StoredSplats {

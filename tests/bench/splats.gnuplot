@@ -44,6 +44,21 @@ do for [s=1:words(scenes)] {
          for [i=1:4] data('storage', s) index i-1 using 2:3:(sprintf('%d', $1)) with labels left offset 0.6,0.5 font ',10' tc rgb colors[i] notitle
 }
 unset multiplot
+
+set output images.'/splat_degrees.svg'
+set multiplot layout 1,words(scenes)
+unset logscale x
+set xtics autofreq
+set xrange [0.7:1.15]
+set yrange [1e-6:0.2]
+set xlabel 'time of a picture, over the first (numbers: degree)'
+do for [s=1:words(scenes)] {
+    set title 'Harmonics, '.word(scenes, s)
+    set ylabel 'rmse against float64 with all'
+    plot for [i=1:2] data('storage', s) index i-1 using 5:4 with linespoints lw 2 pt points[i] ps 0.7 lc rgb colors[i] title names[i], \
+         for [i=1:2] data('storage', s) index i-1 using 5:4:(sprintf('%d', $1)) with labels left offset 0.6,0.5 font ',10' tc rgb colors[i] notitle
+}
+unset multiplot
 unset logscale
 unset xrange
 unset yrange

@@ -160,7 +160,9 @@ void compareStorages(Report& report, const Device& device, std::span<const Splat
         for (const SplatStorage& storage : splatStorages()) {
             const uint32_t most = storage.name == ".splat" ? 0 : scene.splats.degree;
             for (uint32_t degree = most + 1; degree-- > 0;) {
-                const StoredSplats stored = storage.store(withDegree(scene.splats, degree));
+                Splats splats = scene.splats;
+                splats.reduceDegree(degree);
+                const StoredSplats stored = storage.store(splats);
                 const test::SplatInstance instance = {&stored.splats};
                 const SplatPicture picture =
                     test::renderSplats(scene.camera, scene.width, scene.height, {&instance, 1});

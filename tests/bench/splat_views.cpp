@@ -90,15 +90,4 @@ std::vector<SplatStorage> splatStorages() {
             {".splat", asDotSplat}};
 }
 
-Splats withDegree(const Splats& splats, uint32_t degree) {
-    Splats result = splats;
-    result.degree = std::min(degree, splats.degree);
-    const uint32_t kept = result.coefficientCount();
-    const uint32_t all = splats.coefficientCount();
-    for (size_t i = 0; i < splats.size(); i++)
-        for (uint32_t c = 0; c < kept; c++) result.harmonics[i * kept + c] = splats.harmonics[i * all + c];
-    result.harmonics.resize(splats.size() * kept);
-    return result;
-}
-
 }  // namespace glint::bench

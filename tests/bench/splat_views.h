@@ -30,7 +30,4 @@ struct SplatStorage {
 /// they are packed) and .splat, which has no harmonics.
 std::vector<SplatStorage> splatStorages();
 
-/// The same splats with harmonics up to a degree.
-Splats withDegree(const Splats& splats, uint32_t degree);
-
 }  // namespace glint::bench

@@ -74,8 +74,13 @@ TEST_F(SplatAccuracyTest, AMesh) {
 }
 
 TEST_F(SplatAccuracyTest, HardCases) {
-    SplatDrawer drawer(device);
-    for (const SplatScene& scene : hardSplatScenes()) expectAccurate(drawer, scene);
+    // Both forms of the passes, whichever the device has by default.
+    for (const uint32_t threads : {8u, 64u}) {
+        SplatRenderer::Options options;
+        options.threads = threads;
+        SplatDrawer drawer(device, options);
+        for (const SplatScene& scene : hardSplatScenes()) expectAccurate(drawer, scene);
+    }
 }
 
 TEST_F(SplatAccuracyTest, ARealScene) {
@@ -95,6 +100,16 @@ TEST_F(SplatAccuracyTest, PicturesOfAllShapes) {
     expectAccurate(drawer, spreadScene("5x2047", 1000, 100.0f, 5, 2047));
     expectAccurate(drawer, spreadScene("65x63, 170 degrees", 500, 170.0f, 65, 63));
     expectAccurate(drawer, spreadScene("63x65, 1 degree", 500, 1.0f, 63, 65));
+}
+
+TEST_F(SplatAccuracyTest, ScenesFarFromTheOrigin) {
+    // Places are taken relative to the eye, so nothing is lost but what rounding the positions has lost before.
+    SplatScene scene = spreadScene("far", 500, 60.0f, 96, 72);
+    const Vector3f offset(30000.0f, -50000.0f, 20000.0f);
+    for (Vector3f& position : scene.splats.positions) position += offset;
+    scene.camera.lookAt(offset, offset + Vector3f(0, 1, 0));
+    SplatDrawer drawer(device);
+    expectAccurate(drawer, scene);
 }
 
 TEST_F(SplatAccuracyTest, Options) {

@@ -59,7 +59,7 @@ struct View {
     Vector2d middle;    ///< of the picture, in pixels
 
     View(const SplatInstance& instance, const CameraParameters& camera, uint32_t width, uint32_t height)
-        : to_view(Matrix4x4d(camera.view) * Matrix4x4d(instance.transform)),
+        : to_view(exactView(camera) * Matrix4x4d(instance.transform)),
           eye(glm::inverse(Matrix4x4d(instance.transform)) * Vector4d(camera.position)),
           tangents(1.0 / static_cast<double>(camera.projection[0][0]),
                    1.0 / static_cast<double>(camera.projection[1][1])),
@@ -67,6 +67,13 @@ struct View {
         focal = middle / tangents;
     }
 
+    /// The camera's axes and its eye as they are: the view matrix has a translation that was rounded.
+    static Matrix4x4d exactView(const CameraParameters& camera) {
+        const Matrix3x3d axes(Matrix4x4d(camera.view));
+        Matrix4x4d view(axes);
+        view[3] = Vector4d(-(axes * Vector3d(camera.position)), 1.0);
+        return view;
+    }
     /// From the unit sphere to the splat in view space, around its centre.
     Matrix3x3d shapeOf(const Splats& splats, size_t i, const Vector3d& scales) const {
         const Vector4d q = glm::normalize(Vector4d(splats.rotations[i]));

@@ -5,6 +5,9 @@
 
 #include <glint/base/file.h>
 #include <glint/format/image.h>
+#include <glint/format/splats.h>
+#include <glint/geometry/mesh_splats.h>
+#include <glint/geometry/primitives.h>
 
 #include <gtest/gtest.h>
 
@@ -79,6 +82,57 @@ TEST(Golden, TraversedTori) {
     // Devices whose traces do not nest get this.
     EXPECT_TRUE(imagesMatch(*primary_query, *primary, "06_hello_traversal_primary", {.texels = 72}));
     EXPECT_GT(compareImages(*primary, *pipeline, 0.02f).differing, 7200u);
+}
+
+// Sums of alphas and colours in float32, rounded to float16 and to 8 bits: a step. Besides, the rays that lit the
+// splats may graze an edge: then a splat is lighter or darker, and the few pixels around it.
+TEST(Golden, Splats) {
+    const TempDir folder;
+    const std::string at = "--size 160x90 --count 12000";
+    const Expected<Image> image = renderExample("07_hello_splatting", at, folder);
+    const Expected<Image> plain = renderExample("07_hello_splatting", at + " --plain", folder);
+    const Expected<Image> flat = renderExample("07_hello_splatting", at + " --degree 0", folder);
+    ASSERT_TRUE(image && plain && flat);
+    EXPECT_TRUE(matchesGolden(*image, "07_hello_splatting", {.texels = 144}));
+    // What the two methods leave out is less than 1/255 of a splat at a pixel, and few splats are at any.
+    EXPECT_TRUE(imagesMatch(*plain, *image, "07_hello_splatting_plain", {.channel = 3.5f / 255.0f, .texels = 144}));
+    // Highlights need more than one harmonic.
+    EXPECT_GT(compareImages(*flat, *image, 0.02f).differing, 1440u);
+}
+
+// Files of a ball each, in the order in which they are named: red on the right, as seen from the diagonal, green on the
+// left.
+TEST(Golden, SplatsOfFiles) {
+    const TempDir folder;
+    const char* names[] = {"red.ply", "green.spz"};
+    const Vector3f colors[] = {{0.8f, 0.1f, 0.1f}, {0.1f, 0.7f, 0.1f}};
+    for (int i = 0; i < 2; i++) {
+        MeshSplatsOptions options;
+        options.count = 1000;
+        options.degree = 0;
+        options.color = [&](const Vector3f&) { return colors[i]; };
+        // Of any size, anywhere.
+        Mesh mesh = createSphere(30.0f, 3);
+        for (Vector3f& position : mesh.positions) position.x += 1000.0f * static_cast<float>(i);
+        const Expected<Splats> splats = splatsFromMesh(mesh, options);
+        ASSERT_TRUE(splats && splats->save(folder / names[i]));
+    }
+    const std::string path = folder.path().string();
+    const Expected<Image> image = renderExample(
+        "07_hello_splatting", "--size 96x54 --fov 60 --splats '" + path + "/red.ply' --splats '" + path + "/green.spz'",
+        folder);
+    ASSERT_TRUE(image);
+    uint32_t left = 0, right = 0;
+    for (uint32_t y = 0; y < image->height(); y++) {
+        for (uint32_t x = 0; x < image->width(); x++) {
+            const Vector4f color = image->load(x, y);
+            const bool is_red = color.x > 1.5f * color.y, is_green = color.y > 1.5f * color.x;
+            (x < 48 ? left : right) += x < 48 ? is_green : is_red;
+            EXPECT_FALSE(x < 40 ? is_red : x >= 56 && is_green) << x << " " << y;
+        }
+    }
+    EXPECT_GT(left, 100u);
+    EXPECT_GT(right, 100u);
 }
 
 // The course: pixels of edges and of shadows' edges, a tenth of which float64 finds on either side

@@ -21,7 +21,11 @@ constexpr float opacity = 0.98f;
 /// Directions are fitted down to this cosine, with the color at the horizon: discs at an outline are seen from behind a
 /// little.
 constexpr float least_cosine = -0.3f;
-constexpr double unseen_ridge = 1e-3;
+/// What other directions count, with the color that does not depend on the view: splats are seen from there through
+/// gaps and where a surface ends, and a fit that did not know of them would be anything there.
+constexpr double unseen_weight = 0.01;
+/// Discs follow the normals as far as this angle from their triangle, as coarse meshes would be covered with scales.
+constexpr float largest_tilt = radians(25.0f);
 constexpr float shininess = 16.0f;  // exponent of the lobe: narrower ones are beyond degree 3
 constexpr size_t piece = 4096;      // splats whose rays are cast at once
 
@@ -44,6 +48,27 @@ Vector2f latticePoint(uint32_t i, uint32_t count, const Vector2f& shift) {
     return {glm::fract(x + shift.x), glm::fract(y + shift.y)};
 }
 
+/// A light as it is shown, less the half that harmonics begin at.
+Vector3f display(const Vector3f& light) {
+    Vector3f color;
+    for (int k = 0; k < 3; k++) color[k] = std::pow(std::clamp(light[k], 0.0f, 1.0f), 1.0f / 2.2f) - 0.5f;
+    return color;
+}
+
+/// The normal of a disc: the sample's, or what is on the way to it from that of its triangle.
+Vector3f discNormal(const Mesh& mesh, const SurfaceSample& sample) {
+    const uint32_t* corners = &mesh.indices[size_t{sample.triangle} * 3];
+    Vector3f face = surfacePoint(mesh.positions[corners[0]], mesh.positions[corners[1]], mesh.positions[corners[2]],
+                                 sample.barycentrics, {}, {})
+                        .normal;
+    if (glm::dot(face, sample.normal) < 0.0f) face = -face;
+    const float cosine = glm::dot(face, sample.normal);
+    const Vector3f aside = sample.normal - cosine * face;
+    if (cosine >= std::cos(largest_tilt) || face == Vector3f(0.0f) || !(glm::length(aside) > 1e-6f))
+        return sample.normal;
+    return std::cos(largest_tilt) * face + std::sin(largest_tilt) * glm::normalize(aside);
+}
+
 /// Lights splats: a light, a surface, and the directions from which colors are wanted.
 class Baker {
 public:
@@ -54,13 +79,15 @@ public:
           lamp_(glm::normalize(options.light.direction)),
           lamp_frame_(frameOf(lamp_)) {
         const SphereRule rule = sphereRule(8);
+        std::vector<Vector3d> from_eye;
+        std::vector<double> weights;
         for (size_t i = 0; i < rule.directions.size(); i++) {
-            if (rule.directions[i].z < double{least_cosine}) continue;
-            seen_.emplace_back(rule.directions[i]);
-            seen_weights_.push_back(rule.weights[i]);
-            seen_directions_.push_back(-rule.directions[i]);
+            const bool is_seen = rule.directions[i].z >= double{least_cosine};
+            to_eye_.emplace_back(rule.directions[i]);
+            from_eye.push_back(-rule.directions[i]);
+            weights.push_back(rule.weights[i] * (is_seen ? 1.0 : unseen_weight));
         }
-        fit_ = HarmonicsFit(options.degree, seen_directions_, seen_weights_, unseen_ridge);
+        fit_ = HarmonicsFit(options.degree, from_eye, weights);
         const SphereRule all = sphereRule(4);
         for (const Vector3d& direction : all.directions) turned_.emplace_back(direction);
         turn_ = HarmonicsFit(options.degree, all.directions, all.weights);
@@ -179,9 +206,13 @@ private:
             const float x = 1.0f - std::clamp(cosine, 0.0f, 1.0f);
             return options_.gloss + (1.0f - options_.gloss) * (x * x * x * x * x);
         };
-        values_.resize(seen_.size());
-        for (size_t i = 0; i < seen_.size(); i++) {
-            Vector3f eye = seen_[i];
+        values_.resize(to_eye_.size());
+        for (size_t i = 0; i < to_eye_.size(); i++) {
+            Vector3f eye = to_eye_[i];
+            if (eye.z < least_cosine) {
+                values_[i] = display(diffuse);
+                continue;
+            }
             if (eye.z < 0.0f) eye = glm::normalize(Vector3f(eye.x, eye.y, 1e-3f));
             const Vector3f half = glm::normalize(eye + lamp);
             // Normalised so that a white lobe sends on as much as arrives, whatever its exponent.
@@ -190,7 +221,7 @@ private:
             const float height = glm::dot(Vector3f(-eye.x, -eye.y, eye.z), up);
             const Vector3f mirrored = glm::mix(options_.light.ground, options_.light.sky, 0.5f + 0.5f * height);
             const Vector3f light = diffuse + lobe * lamp_light + schlick(eye.z) * arrived.sky_share * mirrored;
-            for (int k = 0; k < 3; k++) values_[i][k] = std::pow(std::clamp(light[k], 0.0f, 1.0f), 1.0f / 2.2f) - 0.5f;
+            values_[i] = display(light);
         }
         std::array<Vector3f, max_harmonics> local;
         fit_.fit(values_, local);
@@ -208,9 +239,7 @@ private:
     Vector3f up_;
     Vector3f lamp_;
     glm::quat lamp_frame_;
-    std::vector<Vector3f> seen_;             ///< directions to the eye, the normal being +Z
-    std::vector<Vector3d> seen_directions_;  ///< the same from the eye
-    std::vector<double> seen_weights_;
+    std::vector<Vector3f> to_eye_;  ///< directions, the normal being +Z
     HarmonicsFit fit_ = HarmonicsFit(0, {}, {});
     std::vector<Vector3f> turned_;
     HarmonicsFit turn_ = HarmonicsFit(0, {}, {});
@@ -261,7 +290,7 @@ Expected<Splats> splatsFromMesh(const Mesh& mesh, const MeshSplatsOptions& optio
     splats.opacities.assign(count, opacity);
     splats.harmonics.resize(count * splats.coefficientCount());
     for (const SurfaceSample& sample : *samples) {
-        const glm::quat frame = frameOf(sample.normal);
+        const glm::quat frame = frameOf(discNormal(mesh, sample));
         const float radius = radius_over_spacing * sample.spacing;
         splats.positions.push_back(sample.position);
         splats.scales.emplace_back(radius, radius, thickness_over_radius * radius);

@@ -40,15 +40,16 @@ struct MeshSplatsOptions {
 
 /// Splats that look like a mesh under a light.
 ///
-/// Discs lie on points of sampleSurface, along the mesh's normals (those of its triangles where it has none): their
-/// standard deviation is 0.75 of the distance to their neighbours, a tenth of that across the surface, their opacity
-/// 0.98, so that they close it: seen along its normal, at most 2 percent of what is behind shines through.
+/// Discs lie on points of sampleSurface, along the mesh's normals (those of its triangles where it has none), but no
+/// farther than 25 degrees from their triangle. Their standard deviation is 0.75 of the distance to their neighbours, a
+/// tenth of that across the surface, their opacity 0.98, so that they close it: seen along its normal, at most 2
+/// percent of what is behind shines through. At sharp edges discs reach over the edge.
 ///
 /// Colors are of the lamp and of the sky, as far as `occlusion` lets their light arrive, on a diffuse surface with a
 /// gloss (Blinn and Phong's lobe, Schlick's Fresnel); raised to 1 / 2.2, as they are to be shown; and then fitted by
-/// harmonics, on the directions from which a splat can be seen and a little beyond (see HarmonicsFit). How far a fit is
-/// from the color: 0.02 root mean square at the default gloss and degree 3. No light goes from surface to
-/// surface.
+/// harmonics, on the directions from which a splat can be seen and a little beyond; the rest count a hundredth (see
+/// HarmonicsFit). A fit is 0.023 from the color at the default gloss and degree 3, root mean square. No light goes from
+/// surface to surface.
 ///
 /// `occlusion` is asked for pieces of some hundred thousand rays, which have to be answered in the order of the rays;
 /// usually by a RayCaster for the mesh, and what else there is:

@@ -112,8 +112,7 @@ SphereRule sphereRule(uint32_t order) {
     return rule;
 }
 
-HarmonicsFit::HarmonicsFit(uint32_t degree, std::span<const Vector3d> directions, std::span<const double> weights,
-                           double ridge) {
+HarmonicsFit::HarmonicsFit(uint32_t degree, std::span<const Vector3d> directions, std::span<const double> weights) {
     directions = directions.first(std::min(directions.size(), weights.size()));
     count_ = (std::min(degree, 3u) + 1) * (std::min(degree, 3u) + 1);
     Square gram = {};
@@ -122,7 +121,6 @@ HarmonicsFit::HarmonicsFit(uint32_t degree, std::span<const Vector3d> directions
         for (uint32_t row = 0; row < count_; row++)
             for (uint32_t column = 0; column <= row; column++) gram[row][column] += weights[i] * y[row] * y[column];
     }
-    for (uint32_t i = 1; i < count_; i++) gram[i][i] += ridge;
     factorise(gram, count_);
     matrix_.resize(directions.size() * count_);
     for (size_t i = 0; i < directions.size(); i++) {

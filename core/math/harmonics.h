@@ -37,18 +37,16 @@ struct SphereRule {
 SphereRule sphereRule(uint32_t order);
 
 /// The sum c_0 Y_0 + ... that is nearest to a function of direction, by weighted least squares: it minimises the sum of
-/// weights[i] * |f(directions[i]) - sum|^2 + ridge * |c_1, c_2, ...|^2.
+/// weights[i] * |f(directions[i]) - sum|^2.
 ///
-/// With all directions of a sphereRule of order 4 or more and without ridge this is the projection, c_k = integral of
-/// f Y_k. With the directions of a part of the sphere it is the best fit there; then a ridge (weights of a whole sphere
-/// add up to 4 pi; 1e-3 does well for half of it) keeps what the sum is elsewhere from growing without bounds.
+/// With the directions and weights of a sphereRule of order 4 or more this is the projection, c_k = integral of f Y_k.
+/// Where a part of the sphere matters more, give the rest small weights; without any the sum may be anything there.
 class HarmonicsFit {
 public:
     /// `degree`: 0 to 3, larger ones count as 3. `weights`: one for each direction, not negative; what is left over of
-    /// the longer of the two is passed over. Directions that do not determine the coefficients (too few of them, and
-    /// no ridge) leave those at 0 that they say nothing of.
-    HarmonicsFit(uint32_t degree, std::span<const Vector3d> directions, std::span<const double> weights,
-                 double ridge = 0.0);
+    /// the longer of the two is passed over. Directions that do not determine the coefficients, such as too few of
+    /// them, leave those at 0 that they say nothing of.
+    HarmonicsFit(uint32_t degree, std::span<const Vector3d> directions, std::span<const double> weights);
 
     /// (degree + 1)^2.
     uint32_t coefficientCount() const { return count_; }

@@ -1,3 +1,4 @@
+#include "mesh_block.h"
 #include "shader_source.h"
 
 #include <glint/base/format_error.h>
@@ -168,6 +169,7 @@ Expected<std::vector<uint32_t>> translate(const ShaderSource& source, const Prep
         return unexpected(sourceError(source, ErrorCode::ShaderCompile, "shader.compile",
                                       fmt::format("no SPIR-V was made: {}", logger.getAllMessages())));
     dropSourceExtensions(words);
+    if (source.stage == ShaderStage::Mesh) dropUnusedShadingRate(words);
     return words;
 }
 

@@ -157,6 +157,7 @@ public:
         readCapabilities();
         const ShaderStage stage = reflection_.stage;
         if (stage == ShaderStage::Compute || stage == ShaderStage::Task || stage == ShaderStage::Mesh) readGroupSize();
+        if (stage == ShaderStage::Task || stage == ShaderStage::Mesh) readMesh();
     }
 
     void readRayVariables(std::span<const uint32_t> words) {
@@ -311,6 +312,19 @@ private:
         }
     }
 
+    void readMesh() {
+        if (reflection_.stage == ShaderStage::Mesh) {
+            reflection_.mesh_vertices = module_.get_execution_mode_argument(spv::ExecutionModeOutputVertices);
+            reflection_.mesh_primitives = module_.get_execution_mode_argument(spv::ExecutionModeOutputPrimitivesEXT);
+        }
+        module_.ir.for_each_typed_id<spirv_cross::SPIRVariable>(
+            [&](uint32_t, const spirv_cross::SPIRVariable& variable) {
+                if (variable.storage != spv::StorageClassTaskPayloadWorkgroupEXT) return;
+                reflection_.payload_size =
+                    std::max(reflection_.payload_size, componentBytes(module_, module_.get_type(variable.basetype)));
+            });
+    }
+
     void readCapabilities() {
         for (const spv::Capability capability : module_.get_declared_capabilities()) {
             switch (capability) {
@@ -318,6 +332,12 @@ private:
                 case spv::CapabilityPhysicalStorageBufferAddresses: reflection_.uses_addresses = true; break;
                 case spv::CapabilityFloat64: reflection_.uses_float64 = true; break;
                 case spv::CapabilityInt64: reflection_.uses_int64 = true; break;
+                case spv::CapabilityShaderLayer:
+                case spv::CapabilityShaderViewportIndex:
+                case spv::CapabilityShaderViewportIndexLayerEXT:
+                    reflection_.uses_layer =
+                        reflection_.stage == ShaderStage::Vertex || reflection_.stage == ShaderStage::Evaluate;
+                    break;
                 case spv::CapabilityGroupNonUniform:
                 case spv::CapabilityGroupNonUniformVote:
                 case spv::CapabilityGroupNonUniformArithmetic:

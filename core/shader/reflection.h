@@ -147,6 +147,10 @@ struct Reflection {
     bool uses_float64 = false;
     bool uses_int64 = false;
     bool uses_subgroups = false;
+    bool uses_layer = false;       ///< vertex and evaluate stages: gl_Layer or gl_ViewportIndex
+    uint32_t payload_size = 0;     ///< task and mesh stages: bytes of the taskPayloadSharedEXT variable
+    uint32_t mesh_vertices = 0;    ///< mesh stage: most that a group writes
+    uint32_t mesh_primitives = 0;  ///< likewise
 };
 
 /// Reads one entry point of a module, the first one if `entry` is empty. Resources that the entry point does not use

@@ -11,7 +11,7 @@ namespace glint {
 namespace {
 
 /// Raised with any change of what the steps make of the same text, or of what an entry holds.
-constexpr uint32_t cache_version = 3;
+constexpr uint32_t cache_version = 5;
 
 Hash toolHash() {
     static const Hash hash = [] {

@@ -152,7 +152,8 @@ template <class Archive, Is<Reflection> Value>
 void visit(Archive& archive, Value& v) {
     archive(v.stage, v.entry, v.resources, v.hidden, v.constants, v.inputs, v.outputs, v.ray_variables, v.ray_calls,
             v.record_size, v.push_size, v.group_size, v.group_constants, v.uses_ray_query, v.uses_addresses,
-            v.uses_float64, v.uses_int64, v.uses_subgroups);
+            v.uses_float64, v.uses_int64, v.uses_subgroups, v.uses_layer, v.payload_size, v.mesh_vertices,
+            v.mesh_primitives);
 }
 
 }  // namespace

@@ -57,6 +57,25 @@ Expected<std::vector<uint32_t>> compileOnly(const ShaderSource& source) {
 
 }  // namespace
 
+TEST_F(ShaderCompile, OnlyWhoNamesTheShadingRateAsksForIt) {
+    const auto compiled = [](std::string_view member) {
+        const std::string text =
+            "layout(local_size_x = 1) in; layout(triangles, max_vertices = 3, max_primitives = 1) out;"
+            "void main() { SetMeshOutputsEXT(0, 0); uint i = gl_LocalInvocationIndex;" +
+            std::string(member) + " }";
+        const Expected<CompiledShader> result = compileShader(glsl(text, ShaderStage::Mesh));
+        EXPECT_THAT(result, IsOk()) << text;
+        return result ? shader::disassemble(result->words) : std::string();
+    };
+    EXPECT_THAT(compiled("gl_MeshPrimitivesEXT[i].gl_Layer = 1;"),
+                testing::AllOf(testing::HasSubstr("BuiltIn Layer"), testing::Not(testing::HasSubstr("ShadingRate")),
+                               testing::Not(testing::HasSubstr("shading_rate"))));
+    EXPECT_THAT(compiled("gl_MeshPrimitivesEXT[i].gl_PrimitiveShadingRateEXT = 1;"),
+                testing::AllOf(testing::HasSubstr("OpCapability FragmentShadingRateKHR"),
+                               testing::HasSubstr("BuiltIn PrimitiveShadingRate")));
+    EXPECT_THAT(compiled(""), testing::Not(testing::HasSubstr("ShadingRate")));
+}
+
 TEST_F(ShaderCompile, EveryStageCompilesWithoutWarning) {
     std::vector<std::string> warnings;
     setLogCallback([&](LogLevel, std::string_view, std::string_view text) { warnings.emplace_back(text); });

@@ -66,6 +66,29 @@ TEST_F(ShaderReflect, EveryKindIsRead) {
     EXPECT_EQ(find(reflection, "S")->instance, "");
 }
 
+TEST_F(ShaderReflect, MeshesAndTheirPayload) {
+    const std::string payload = "struct Payload { uint first; vec3 box[2]; };\ntaskPayloadSharedEXT Payload payload;\n";
+    const Reflection mesh = of("layout(local_size_x = 32) in;\n"
+                               "layout(triangles, max_vertices = 96, max_primitives = 64) out;\n" +
+                                   payload + "void main() { SetMeshOutputsEXT(payload.first, 0); }\n",
+                               ShaderStage::Mesh);
+    EXPECT_EQ(mesh.mesh_vertices, 96u);
+    EXPECT_EQ(mesh.mesh_primitives, 64u);
+    EXPECT_EQ(mesh.payload_size, 28u);
+    EXPECT_EQ(mesh.group_size, (std::array<uint32_t, 3>{32, 1, 1}));
+    const Reflection task = of("layout(local_size_x = 4) in;\n" + payload +
+                                   "void main() { payload.first = 1; EmitMeshTasksEXT(1, 1, 1); }\n",
+                               ShaderStage::Task);
+    EXPECT_EQ(task.payload_size, 28u);
+    EXPECT_EQ(task.mesh_vertices + task.mesh_primitives, 0u);
+}
+
+TEST_F(ShaderReflect, LayersOfVertices) {
+    EXPECT_TRUE(of("void main() { gl_Position = vec4(0.0); gl_Layer = 1; }", ShaderStage::Vertex).uses_layer);
+    EXPECT_TRUE(of("void main() { gl_Position = vec4(0.0); gl_ViewportIndex = 1; }", ShaderStage::Vertex).uses_layer);
+    EXPECT_FALSE(of("void main() { gl_Position = vec4(0.0); }", ShaderStage::Vertex).uses_layer);
+}
+
 TEST_F(ShaderReflect, SizesOfBlocks) {
     const Reflection reflection = of("layout(set = 0, binding = 0) uniform A { vec4 a; float b; };\n"
                                      "layout(set = 0, binding = 1) buffer B { float values[]; };\n"

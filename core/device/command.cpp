@@ -28,6 +28,10 @@ void Command::setViewport(float x, float y, float width, float height, float min
     if (core_) core_->setViewport({x, y, width, height, minimum_depth, maximum_depth});
 }
 
+void Command::setViewports(std::span<const Viewport> viewports, Where where) {
+    if (core_) core_->setViewports(viewports, where);
+}
+
 void Command::setScissor(int32_t x, int32_t y, uint32_t width, uint32_t height) {
     if (core_) core_->setScissor({x, y, width, height});
 }
@@ -59,12 +63,41 @@ void Command::drawElementsInstanced(uint32_t indices, uint32_t first, int32_t ba
 }
 
 void Command::drawArraysIndirect(const Buffer& buffer, uint64_t offset, uint32_t draws, uint32_t stride, Where where) {
-    if (core_) core_->drawIndirect(false, buffer, offset, draws, stride, where);
+    if (core_) core_->drawIndirect(detail::CommandType::DrawIndirect, {buffer, offset, draws, stride}, where);
 }
 
 void Command::drawElementsIndirect(const Buffer& buffer, uint64_t offset, uint32_t draws, uint32_t stride,
                                    Where where) {
-    if (core_) core_->drawIndirect(true, buffer, offset, draws, stride, where);
+    if (core_) core_->drawIndirect(detail::CommandType::DrawIndexedIndirect, {buffer, offset, draws, stride}, where);
+}
+
+void Command::drawArraysIndirect(const Buffer& buffer, uint64_t offset, const Buffer& count, uint64_t count_offset,
+                                 uint32_t draws, uint32_t stride, Where where) {
+    if (core_)
+        core_->drawIndirect(detail::CommandType::DrawIndirect, {buffer, offset, draws, stride, &count, count_offset},
+                            where);
+}
+
+void Command::drawElementsIndirect(const Buffer& buffer, uint64_t offset, const Buffer& count, uint64_t count_offset,
+                                   uint32_t draws, uint32_t stride, Where where) {
+    if (core_)
+        core_->drawIndirect(detail::CommandType::DrawIndexedIndirect,
+                            {buffer, offset, draws, stride, &count, count_offset}, where);
+}
+
+void Command::drawMesh(uint32_t x, uint32_t y, uint32_t z, Where where) {
+    if (core_) core_->drawMesh(x, y, z, where);
+}
+
+void Command::drawMeshIndirect(const Buffer& buffer, uint64_t offset, uint32_t draws, uint32_t stride, Where where) {
+    if (core_) core_->drawIndirect(detail::CommandType::DrawMeshIndirect, {buffer, offset, draws, stride}, where);
+}
+
+void Command::drawMeshIndirect(const Buffer& buffer, uint64_t offset, const Buffer& count, uint64_t count_offset,
+                               uint32_t draws, uint32_t stride, Where where) {
+    if (core_)
+        core_->drawIndirect(detail::CommandType::DrawMeshIndirect,
+                            {buffer, offset, draws, stride, &count, count_offset}, where);
 }
 
 }  // namespace glint

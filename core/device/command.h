@@ -33,9 +33,15 @@ public:
         setIndexData(sizeof(T) == 2 ? FormatRu16 : FormatRu32, indices, sizeof(indices), where);
     }
 
-    /// In pixels from the top left corner; the whole target by default.
+    /// The whole target by default.
     void setViewport(float x, float y, float width, float height, float minimum_depth = 0.0f,
                      float maximum_depth = 1.0f);
+    /// Several, chosen by gl_ViewportIndex, which vertex (FeatureVertexLayer), geometry and mesh shaders write: at most
+    /// Features::maxViewports, more than one with FeatureMultiViewport ("draw.viewports"). The scissor cuts them all.
+    void setViewports(std::span<const Viewport> viewports, Where where = Where::current());
+    void setViewports(std::initializer_list<Viewport> viewports, Where where = Where::current()) {
+        setViewports(std::span(viewports.begin(), viewports.size()), where);
+    }
     void setScissor(int32_t x, int32_t y, uint32_t width, uint32_t height);
     /// Constant of BlendFuncFactor.
     void setBlendFactor(const Color& color);
@@ -54,6 +60,21 @@ public:
                             Where where = Where::current());
     void drawElementsIndirect(const Buffer& buffer, uint64_t offset = 0, uint32_t draws = 1, uint32_t stride = 0,
                               Where where = Where::current());
+    /// The same with the number of draws from a buffer: the uint32_t at `count_offset` of `count`, which has
+    /// FlagIndirect too, or `draws` if that is less. Needs FeatureIndirectCount ("draw.count").
+    void drawArraysIndirect(const Buffer& buffer, uint64_t offset, const Buffer& count, uint64_t count_offset,
+                            uint32_t draws, uint32_t stride = 0, Where where = Where::current());
+    void drawElementsIndirect(const Buffer& buffer, uint64_t offset, const Buffer& count, uint64_t count_offset,
+                              uint32_t draws, uint32_t stride = 0, Where where = Where::current());
+
+    /// Starts groups of the pipeline's task shader, or of its mesh shader if it has no task shader. (Not threads, as
+    /// dispatch counts them.) Errors: "draw.mesh_groups", "draw.mesh".
+    void drawMesh(uint32_t x, uint32_t y = 1, uint32_t z = 1, Where where = Where::current());
+    /// Group counts from a buffer: three uint32_t a draw. Counts beyond the limits are undefined.
+    void drawMeshIndirect(const Buffer& buffer, uint64_t offset = 0, uint32_t draws = 1, uint32_t stride = 0,
+                          Where where = Where::current());
+    void drawMeshIndirect(const Buffer& buffer, uint64_t offset, const Buffer& count, uint64_t count_offset,
+                          uint32_t draws, uint32_t stride = 0, Where where = Where::current());
 };
 
 }  // namespace glint

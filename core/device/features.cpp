@@ -7,11 +7,11 @@ namespace glint {
 namespace {
 
 constexpr std::array<const char*, FeatureCount> names = {
-    "computeTracing", "fragmentTracing",  "rayTracing",        "meshShader",   "bufferAddress",
-    "textureTable",   "shaderf16",        "shaderf64",         "shaderu8",     "shaderu16",
-    "shaderu64",      "atomicBufferu64",  "geometryShader",    "tessellation", "anisotropy",
-    "cubeArray",      "indirectCount",    "multiDrawIndirect", "wireframe",    "depthClamp",
-    "textureBC",      "samplerReduction", "statistics",        "timestamps",   "present",
+    "computeTracing", "fragmentTracing", "rayTracing",    "meshShader",       "bufferAddress", "textureTable",
+    "shaderf16",      "shaderf64",       "shaderu8",      "shaderu16",        "shaderu64",     "atomicBufferu64",
+    "geometryShader", "tessellation",    "anisotropy",    "cubeArray",        "indirectCount", "multiDrawIndirect",
+    "wireframe",      "depthClamp",      "textureBC",     "samplerReduction", "statistics",    "timestamps",
+    "present",        "vertexLayer",     "multiViewport",
 };
 
 }  // namespace

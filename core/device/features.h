@@ -33,7 +33,9 @@ enum Feature : uint64_t {
     FeatureStatistics = 1ull << 22,        ///< pipeline statistics queries
     FeatureTimestamps = 1ull << 23,        ///< time queries
     FeaturePresent = 1ull << 24,           ///< windows
-    FeatureCount = 25,
+    FeatureVertexLayer = 1ull << 25,       ///< gl_Layer and gl_ViewportIndex in vertex and evaluate shaders
+    FeatureMultiViewport = 1ull << 26,     ///< Command::setViewports with more than one
+    FeatureCount = 27,
 };
 
 /// Who answers ray queries: the driver, or Glint's own hierarchies and traversal in the shader (docs/tracing.md).
@@ -89,12 +91,24 @@ struct Features {
     uint32_t maxTextureCubeSize = 0;
     uint32_t maxTextureLayers = 0;
     uint32_t maxTextureSamples = 1;
-    uint32_t maxTargets = 0;  ///< colour textures of one Target
+    uint32_t maxTargets = 0;       ///< colour textures of one Target
+    uint32_t maxTargetLayers = 0;  ///< layers of one Target
+    uint32_t maxViewports = 1;
+    uint32_t maxIndirectDraws = 1;  ///< of one indirect command
     uint32_t maxGroupSizeX = 0, maxGroupSizeY = 0, maxGroupSizeZ = 0;
     uint32_t maxGroupThreads = 0;
     uint32_t maxGroupCountX = 0, maxGroupCountY = 0, maxGroupCountZ = 0;
     uint32_t groupMemory = 0;  ///< bytes of shared memory of a group
     uint32_t maxPushSize = 0;  ///< bytes of push constants
+    /// Task and mesh shaders; all 0 without meshShader. Groups are those of one drawMesh, of whichever stage comes
+    /// first.
+    uint32_t maxMeshGroupCountX = 0, maxMeshGroupCountY = 0, maxMeshGroupCountZ = 0;
+    uint32_t maxMeshGroupCount = 0;  ///< in all
+    uint32_t maxTaskThreads = 0;     ///< of a group of a task shader
+    uint32_t maxTaskPayload = 0;     ///< bytes that a task shader hands to its mesh shaders
+    uint32_t maxMeshThreads = 0;     ///< of a group of a mesh shader
+    uint32_t maxMeshVertices = 0;    ///< written by a group
+    uint32_t maxMeshPrimitives = 0;  ///< likewise
     uint32_t maxAnisotropy = 1;
     uint64_t maxUniformSize = 0;  ///< bytes of one uniform binding
     uint64_t maxStorageSize = 0;  ///< bytes of one storage binding

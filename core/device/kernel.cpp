@@ -8,14 +8,10 @@ namespace glint {
 namespace detail {
 
 Expected<std::unique_ptr<Native>> KernelObject::createNative(const Stages& stages, Where where) {
-    const Reflection* shader = stages.find(ShaderStage::Compute);
-    if (!shader)
+    if (!stages.find(ShaderStage::Compute))
         return unexpected(problem(where, ErrorCode::InvalidArgument, "program.stage", "there is no compute shader"));
 
-    std::array<uint32_t, 3> size = shader->group_size;
-    for (size_t i = 0; i < size.size(); i++)
-        for (const SpecializationValue& constant : stages.constants[0])
-            if (constant.id == shader->group_constants[i]) size[i] = constant.value;
+    const std::array<uint32_t, 3> size = stages.groupSize(0);
     const Features& limits = device()->features();
     const uint64_t threads = static_cast<uint64_t>(size[0]) * size[1] * size[2];
     const bool within = size[0] <= limits.maxGroupSizeX && size[1] <= limits.maxGroupSizeY &&

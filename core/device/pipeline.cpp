@@ -49,13 +49,52 @@ Error PipelineObject::checkStages(const Stages& stages, Where where) const {
     const auto lacks = [&](const char* what) {
         return problem(where, ErrorCode::InvalidArgument, "program.stage", what);
     };
-    if (!has(ShaderStage::Vertex)) return lacks("there is no vertex shader");
+    const bool has_vertices = has(ShaderStage::Vertex) || has(ShaderStage::Control) || has(ShaderStage::Evaluate) ||
+                              has(ShaderStage::Geometry);
+    if (has(ShaderStage::Mesh) && has_vertices)
+        return lacks("a mesh shader takes the place of vertex, control, evaluate and geometry shaders");
+    if (has(ShaderStage::Task) && !has(ShaderStage::Mesh)) return lacks("there is a task shader and no mesh shader");
+    if (!has(ShaderStage::Vertex) && !has(ShaderStage::Mesh)) return lacks("there is no vertex or mesh shader");
     if (!desc.color_formats.empty() && !has(ShaderStage::Fragment))
         return lacks("there are colour formats and no fragment shader");
     const bool patches = desc.primitive == Primitive::Patch;
     if (has(ShaderStage::Control) != patches || has(ShaderStage::Evaluate) != patches)
         return lacks("control and evaluate shaders and PrimitivePatch belong together");
     return {};
+}
+
+Error PipelineObject::checkMesh(const Stages& stages, Where where) const {
+    const Reflection& mesh = *stages.find(ShaderStage::Mesh);
+    const Reflection* const task = stages.find(ShaderStage::Task);
+    const Features& limits = device()->features();
+    if (!attributes.empty())
+        return problem(where, ErrorCode::InvalidArgument, "pipeline.attribute",
+                       fmt::format("a mesh shader reads no attributes, {} were added", attributes.size()));
+    if (mesh.payload_size != 0 && (!task || task->payload_size != mesh.payload_size))
+        return problem(where, ErrorCode::InvalidArgument, "pipeline.payload",
+                       task ? fmt::format("the mesh shader reads a payload of {} bytes, the task shader writes {}",
+                                          mesh.payload_size, task->payload_size)
+                            : "the mesh shader reads a payload, and there is no task shader");
+    const auto beyond = [&](const char* what, uint64_t has, uint32_t limit) {
+        if (has <= limit) return Error();
+        return problem(where, ErrorCode::OutOfRange, "pipeline.mesh",
+                       fmt::format("{} {}, the device takes {}", has, what, limit));
+    };
+    for (size_t i = 0; i < stages.shaders.size(); i++) {
+        const Reflection& stage = stages.shaders[i]->compiled.reflection;
+        const bool is_task = stage.stage == ShaderStage::Task;
+        if (!is_task && stage.stage != ShaderStage::Mesh) continue;
+        const std::array<uint32_t, 3> size = stages.groupSize(i);
+        if (Error error =
+                beyond(is_task ? "threads in a group of the task shader" : "threads in a group of the mesh shader",
+                       static_cast<uint64_t>(size[0]) * size[1] * size[2],
+                       is_task ? limits.maxTaskThreads : limits.maxMeshThreads))
+            return error;
+    }
+    if (Error error = beyond("vertices of a mesh shader", mesh.mesh_vertices, limits.maxMeshVertices)) return error;
+    if (Error error = beyond("primitives of a mesh shader", mesh.mesh_primitives, limits.maxMeshPrimitives))
+        return error;
+    return beyond("bytes of a task shader's payload", task ? task->payload_size : 0, limits.maxTaskPayload);
 }
 
 Error PipelineObject::checkAttributes(const Reflection& vertex, Where where) const {
@@ -127,7 +166,7 @@ Error PipelineObject::checkState(const PipelineDesc& complete, Where where) cons
 
 Expected<std::unique_ptr<Native>> PipelineObject::createNative(const Stages& stages, Where where) {
     if (Error error = checkStages(stages, where)) return unexpected(error);
-    const Reflection& vertex = *stages.find(ShaderStage::Vertex);
+    const Reflection* const vertex = stages.find(ShaderStage::Vertex);
     PipelineDesc complete = desc;
     complete.blends.resize(complete.color_formats.size());
     for (size_t i = 0; i < complete.blends.size(); i++)
@@ -137,14 +176,14 @@ Expected<std::unique_ptr<Native>> PipelineObject::createNative(const Stages& sta
     complete.name = name();
     complete.stages.clear();
     for (size_t i = 0; i < stages.shaders.size(); i++) complete.stages.push_back(stages.desc(i));
-    if (Error error = checkAttributes(vertex, where)) return unexpected(error);
+    if (Error error = vertex ? checkAttributes(*vertex, where) : checkMesh(stages, where)) return unexpected(error);
     if (Error error = checkTargets(complete, stages.find(ShaderStage::Fragment), where)) return unexpected(error);
     if (Error error = checkState(complete, where)) return unexpected(error);
 
     // What no input reads need not be fetched.
     PipelineDesc used = complete;
     std::erase_if(used.attributes, [&](const VertexAttribute& attribute) {
-        return std::ranges::none_of(vertex.inputs,
+        return std::ranges::none_of(vertex->inputs,
                                     [&](const auto& input) { return input.location == attribute.location; });
     });
     auto made = device()->backend->createPipeline(used);
@@ -152,6 +191,7 @@ Expected<std::unique_ptr<Native>> PipelineObject::createNative(const Stages& sta
     // The stages' words and constants go with `stages`.
     complete.stages.clear();
     desc = std::move(complete);
+    has_mesh = !vertex;
     return std::move(*made);
 }
 

@@ -130,6 +130,15 @@ StageDesc ProgramObject::Stages::desc(size_t index) const {
             .constants = constants[index]};
 }
 
+std::array<uint32_t, 3> ProgramObject::Stages::groupSize(size_t index) const {
+    const Reflection& shader = shaders[index]->compiled.reflection;
+    std::array<uint32_t, 3> size = shader.group_size;
+    for (size_t i = 0; i < size.size(); i++)
+        for (const SpecializationValue& constant : constants[index])
+            if (constant.id == shader.group_constants[i]) size[i] = constant.value;
+    return size;
+}
+
 Error ProgramObject::problem(Where where, ErrorCode code, const char* id, std::string_view message) const {
     return makeError(where, code, id, "{}: {}", label(), message).named(name());
 }
@@ -328,7 +337,9 @@ Error ProgramObject::checkFeatures(const Reflection& stage, Where where) const {
     if (stage.uses_addresses) needed |= FeatureBufferAddress;
     if (stage.uses_float64) needed |= FeatureShaderf64;
     if (stage.uses_int64) needed |= FeatureShaderu64;
+    if (stage.uses_layer) needed |= FeatureVertexLayer;
     if (stage.stage == ShaderStage::Geometry) needed |= FeatureGeometryShader;
+    if (stage.stage == ShaderStage::Task || stage.stage == ShaderStage::Mesh) needed |= FeatureMeshShader;
     if (stage.stage == ShaderStage::Control || stage.stage == ShaderStage::Evaluate) needed |= FeatureTessellation;
     for (const ShaderResource& resource : stage.resources)
         if (resource.dimension == ImageDimension::CubeArray) needed |= FeatureCubeArray;
@@ -398,7 +409,7 @@ void setConstant(detail::Object* object, ProgramObject::Constant constant, Progr
 bool takes(detail::ObjectType program, ShaderStage stage) {
     if (program == detail::ObjectType::Kernel) return stage == ShaderStage::Compute;
     if (program == detail::ObjectType::Traversal) return stage >= ShaderStage::RayGen;
-    return stage <= ShaderStage::Fragment;
+    return stage <= ShaderStage::Fragment || stage == ShaderStage::Task || stage == ShaderStage::Mesh;
 }
 
 }  // namespace

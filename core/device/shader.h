@@ -34,6 +34,8 @@ public:
     static constexpr Mask MaskVertex = stageBit(ShaderStage::Vertex);
     static constexpr Mask MaskFragment = stageBit(ShaderStage::Fragment);
     static constexpr Mask MaskCompute = stageBit(ShaderStage::Compute);
+    static constexpr Mask MaskTask = stageBit(ShaderStage::Task);
+    static constexpr Mask MaskMesh = stageBit(ShaderStage::Mesh);
     static constexpr Mask MaskVertexFragment = MaskVertex | MaskFragment;
     static constexpr Mask MaskRayGen = stageBit(ShaderStage::RayGen);
     static constexpr Mask MaskRayMiss = stageBit(ShaderStage::RayMiss);

@@ -89,6 +89,12 @@ void Target::setDepthTexture(const Texture& texture, const Slice& slice, Where w
     if (target) attach(*target, target->depth.texture, target->depth.slice, texture, slice, true, "depth", where);
 }
 
+void Target::setDepthResolve(const Texture& texture, const Slice& slice, Where where) {
+    auto* target = static_cast<TargetObject*>(object_);
+    if (target)
+        attach(*target, target->depth.resolve, target->depth.resolve_slice, texture, slice, true, "resolve", where);
+}
+
 void Target::setColorOperation(uint32_t index, uint8_t operation) {
     TargetObject* target = indexed(object_, index, Where::current());
     if (target) target->colors[index].operation = operation;

@@ -9,6 +9,8 @@
 namespace glint {
 
 /// The textures that a Command draws to. Created by Device::createTarget; the state at Device::createCommand counts.
+/// With slices of several layers (an array's, or the faces of a cube) draws go to the layer that gl_Layer says, which
+/// vertex shaders (FeatureVertexLayer), geometry and mesh shaders write, or to the first; clears go to all.
 /// Not thread-safe: configure and use a target from one thread at a time.
 class Target : public Handle {
 public:
@@ -33,6 +35,8 @@ public:
     void setColorResolve(uint32_t index, const Texture& texture, const Slice& slice = {},
                          Where where = Where::current());
     void setDepthTexture(const Texture& texture, const Slice& slice = {}, Where where = Where::current());
+    /// The first sample of multisampled depth, and stencil, is kept in this texture at the end.
+    void setDepthResolve(const Texture& texture, const Slice& slice = {}, Where where = Where::current());
 
     void setColorOperation(uint32_t index, uint8_t operation);
     void setDepthOperation(uint8_t operation);

@@ -32,6 +32,11 @@ struct Region {
     uint32_t width = 0, height = 0, depth = 0;
 };
 
+/// Where clip space lands on a target: in pixels from its top left corner, and the depths of the near and far end.
+struct Viewport {
+    float x = 0, y = 0, width = 0, height = 0, minimum_depth = 0, maximum_depth = 1;
+};
+
 /// Comparison for depth, stencil and comparing samplers: passes if `new FUNC old`.
 enum class Compare : uint8_t { Never, Less, Equal, LessEqual, Greater, NotEqual, GreaterEqual, Always };
 

@@ -102,6 +102,8 @@ const char* toString(CommandType type) {
         case CommandType::DrawIndexed: return "indexed draw";
         case CommandType::DrawIndirect: return "indirect draw";
         case CommandType::DrawIndexedIndirect: return "indirect indexed draw";
+        case CommandType::DrawMesh: return "mesh draw";
+        case CommandType::DrawMeshIndirect: return "indirect mesh draw";
         case CommandType::CopyInline: return "inline copy";
         case CommandType::CopyBuffer: return "copy of buffer";
         case CommandType::FillBuffer: return "fill of buffer";

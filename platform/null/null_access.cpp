@@ -62,12 +62,15 @@ public:
             case CommandType::Draw:
             case CommandType::DrawIndexed: draw(as<DrawCommand>().state); break;
             case CommandType::DrawIndirect:
-            case CommandType::DrawIndexedIndirect: {
+            case CommandType::DrawIndexedIndirect:
+            case CommandType::DrawMeshIndirect: {
                 const auto& command = as<DrawIndirectCommand>();
                 draw(command.state);
                 need(command.buffer, Stage::Indirect, AccessRead);
+                need(command.count_buffer, Stage::Indirect, AccessRead);
                 break;
             }
+            case CommandType::DrawMesh: draw(as<DrawMeshCommand>().state); break;
             case CommandType::CopyInline: need(as<CopyInlineCommand>().buffer, Stage::Copy, AccessWrite); break;
             case CommandType::FillBuffer: need(as<FillBufferCommand>().buffer, Stage::Copy, AccessWrite); break;
             case CommandType::CopyBuffer: {

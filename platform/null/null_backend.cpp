@@ -59,6 +59,16 @@ Features describeFeatures(FeatureMask mask, const NullSettings& settings) {
     features.maxTextureLayers = 256;
     features.maxTextureSamples = 8;
     features.maxTargets = max_targets;
+    features.maxTargetLayers = 256;
+    features.maxViewports = mask & FeatureMultiViewport ? max_viewports : 1;
+    features.maxIndirectDraws = mask & FeatureMultiDrawIndirect ? 65536 : 1;
+    if (features.meshShader) {
+        features.maxMeshGroupCountX = features.maxMeshGroupCountY = features.maxMeshGroupCountZ = 65535;
+        features.maxMeshGroupCount = 1u << 22;
+        features.maxTaskThreads = features.maxMeshThreads = 128;
+        features.maxTaskPayload = 16384;
+        features.maxMeshVertices = features.maxMeshPrimitives = 256;
+    }
     features.maxGroupSizeX = 1024;
     features.maxGroupSizeY = 1024;
     features.maxGroupSizeZ = 64;

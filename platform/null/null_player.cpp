@@ -115,17 +115,9 @@ void NullPlayer::play(const CommandHeader& header) {
             break;
         }
         case CommandType::DrawIndirect:
-        case CommandType::DrawIndexedIndirect: {
-            const auto& command = as<DrawIndirectCommand>(header);
-            const uint64_t size = header.type == CommandType::DrawIndirect ? 16 : 20;
-            for (uint32_t i = 0; i < command.draws; i++) {
-                const std::byte* record = bytes(command.buffer, command.offset + uint64_t(i) * command.stride, size);
-                uint32_t counts[2] = {};
-                if (record) std::memcpy(counts, record, sizeof(counts));
-                countDraw(counts[0], counts[1]);
-            }
-            break;
-        }
+        case CommandType::DrawIndexedIndirect:
+        case CommandType::DrawMeshIndirect: drawIndirect(as<DrawIndirectCommand>(header)); break;
+        case CommandType::DrawMesh: counters_.draws++; break;
         case CommandType::CopyInline: play(as<CopyInlineCommand>(header)); break;
         case CommandType::CopyBuffer: play(as<CopyBufferCommand>(header)); break;
         case CommandType::FillBuffer: play(as<FillBufferCommand>(header)); break;
@@ -158,6 +150,23 @@ void NullPlayer::countDraw(uint64_t vertices, uint64_t instances) {
     counters_.draws++;
     statistics_[0] += vertices * instances;
     statistics_[2] += vertices * instances;
+}
+
+void NullPlayer::drawIndirect(const DrawIndirectCommand& command) {
+    uint32_t draws = command.draws;
+    if (command.count_buffer != none) {
+        uint32_t count = 0;
+        if (const std::byte* place = bytes(command.count_buffer, command.count_offset, 4))
+            std::memcpy(&count, place, 4);
+        draws = std::min(draws, count);
+    }
+    for (uint32_t i = 0; i < draws; i++) {
+        const std::byte* record =
+            bytes(command.buffer, command.offset + uint64_t(i) * command.stride, indirectSize(command.header.type));
+        uint32_t counts[2] = {};
+        if (record && command.header.type != CommandType::DrawMeshIndirect) std::memcpy(counts, record, sizeof(counts));
+        countDraw(counts[0], counts[1]);
+    }
 }
 
 void NullPlayer::play(const CopyInlineCommand& command) {

@@ -36,6 +36,7 @@ private:
     void endTarget();
     void query(const detail::QueryCommand& command);
     void countDispatch(uint64_t groups);
+    void drawIndirect(const detail::DrawIndirectCommand& command);
     void countDraw(uint64_t vertices, uint64_t instances);
 
     /// `size` bytes at `offset`, or nullptr after a complaint.

@@ -58,6 +58,8 @@ FeatureMask offeredFeatures(const Instance& instance, const Adapter& adapter) {
     add(FeatureSamplerReduction, chain.v12.samplerFilterMinmax);
     add(FeatureStatistics, core.pipelineStatisticsQuery);
     add(FeatureTimestamps, adapter.timestamp_bits[0] != 0 && adapter.properties.limits.timestampPeriod > 0.0f);
+    add(FeatureVertexLayer, chain.v12.shaderOutputLayer && chain.v12.shaderOutputViewportIndex);
+    add(FeatureMultiViewport, core.multiViewport);
     add(FeaturePresent, instance.surfaces && adapter.has(VK_KHR_SWAPCHAIN_EXTENSION_NAME));
     return mask;
 }
@@ -268,8 +270,6 @@ Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
     features.v12.uniformBufferStandardLayout = offered.v12.uniformBufferStandardLayout;
     features.v12.shaderSubgroupExtendedTypes = offered.v12.shaderSubgroupExtendedTypes;
     features.v12.hostQueryReset = offered.v12.hostQueryReset;
-    features.v12.shaderOutputLayer = offered.v12.shaderOutputLayer;
-    features.v12.shaderOutputViewportIndex = offered.v12.shaderOutputViewportIndex;
     features.v12.vulkanMemoryModel = offered.v12.vulkanMemoryModel;
     features.v12.vulkanMemoryModelDeviceScope = offered.v12.vulkanMemoryModelDeviceScope;
     features.v12.timelineSemaphore = VK_TRUE;
@@ -294,6 +294,9 @@ Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
     core.fillModeNonSolid = (mask & FeatureWireframe) != 0;
     core.depthClamp = (mask & FeatureDepthClamp) != 0;
     core.textureCompressionBC = (mask & FeatureTextureBC) != 0;
+    features.v12.shaderOutputLayer = (mask & FeatureVertexLayer) != 0;
+    features.v12.shaderOutputViewportIndex = (mask & FeatureVertexLayer) != 0;
+    core.multiViewport = (mask & FeatureMultiViewport) != 0;
     core.pipelineStatisticsQuery = (mask & FeatureStatistics) != 0;
     features.v12.drawIndirectCount = (mask & FeatureIndirectCount) != 0;
     features.v12.samplerFilterMinmax = (mask & FeatureSamplerReduction) != 0;
@@ -345,6 +348,28 @@ Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
     return enabled;
 }
 
+namespace {
+
+/// Where task and mesh shaders have limits of their own, the lower one: groups are started the same way.
+void describeMesh(const VkPhysicalDeviceMeshShaderPropertiesEXT& mesh, Features& features) {
+    const auto count = [&](size_t i) { return std::min(mesh.maxTaskWorkGroupCount[i], mesh.maxMeshWorkGroupCount[i]); };
+    // Along each axis Vulkan asks for as many threads as in all.
+    const auto threads = [](uint32_t all, const uint32_t(&size)[3]) {
+        return std::min(all, *std::min_element(std::begin(size), std::end(size)));
+    };
+    features.maxMeshGroupCountX = count(0);
+    features.maxMeshGroupCountY = count(1);
+    features.maxMeshGroupCountZ = count(2);
+    features.maxMeshGroupCount = std::min(mesh.maxTaskWorkGroupTotalCount, mesh.maxMeshWorkGroupTotalCount);
+    features.maxTaskThreads = threads(mesh.maxTaskWorkGroupInvocations, mesh.maxTaskWorkGroupSize);
+    features.maxTaskPayload = mesh.maxTaskPayloadSize;
+    features.maxMeshThreads = threads(mesh.maxMeshWorkGroupInvocations, mesh.maxMeshWorkGroupSize);
+    features.maxMeshVertices = mesh.maxMeshOutputVertices;
+    features.maxMeshPrimitives = mesh.maxMeshOutputPrimitives;
+}
+
+}  // namespace
+
 Features describeFeatures(const Instance& instance, const Adapter& adapter, FeatureMask mask) {
     VkPhysicalDeviceVulkan11Properties v11 = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_1_PROPERTIES};
     VkPhysicalDeviceVulkan13Properties v13 = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_VULKAN_1_3_PROPERTIES};
@@ -352,8 +377,13 @@ Features describeFeatures(const Instance& instance, const Adapter& adapter, Feat
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ACCELERATION_STRUCTURE_PROPERTIES_KHR};
     VkPhysicalDeviceRayTracingPipelinePropertiesKHR pipelines = {
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_PROPERTIES_KHR};
+    VkPhysicalDeviceMeshShaderPropertiesEXT mesh = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MESH_SHADER_PROPERTIES_EXT};
     VkPhysicalDeviceProperties2 properties = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_PROPERTIES_2, &v11, {}};
     v11.pNext = &v13;
+    if (mask & FeatureMeshShader) {
+        properties.pNext = &mesh;
+        mesh.pNext = &v11;
+    }
     if (adapter.has(VK_KHR_ACCELERATION_STRUCTURE_EXTENSION_NAME)) {
         v13.pNext = &structures;
         if (adapter.has(VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME)) structures.pNext = &pipelines;
@@ -398,6 +428,10 @@ Features describeFeatures(const Instance& instance, const Adapter& adapter, Feat
         if (samples & count) features.maxTextureSamples = count;
     }
     features.maxTargets = std::min(limits.maxColorAttachments, detail::max_targets);
+    features.maxTargetLayers = limits.maxFramebufferLayers;
+    features.maxViewports = (mask & FeatureMultiViewport) ? std::min(limits.maxViewports, detail::max_viewports) : 1;
+    features.maxIndirectDraws = limits.maxDrawIndirectCount;
+    if (features.meshShader) describeMesh(mesh, features);
     features.maxGroupSizeX = limits.maxComputeWorkGroupSize[0];
     features.maxGroupSizeY = limits.maxComputeWorkGroupSize[1];
     features.maxGroupSizeZ = limits.maxComputeWorkGroupSize[2];

@@ -46,9 +46,10 @@ namespace glint::vulkan {
     X(DestroyPipeline) X(CreateQueryPool) X(DestroyQueryPool) X(ResetQueryPool) \
     X(GetQueryPoolResults) X(CmdPipelineBarrier2) X(CmdBindPipeline) X(CmdBindDescriptorSets) \
     X(CmdPushConstants) X(CmdDispatch) X(CmdDispatchIndirect) X(CmdBeginRendering) \
-    X(CmdEndRendering) X(CmdSetViewport) X(CmdSetScissor) X(CmdSetBlendConstants) \
+    X(CmdEndRendering) X(CmdSetViewportWithCount) X(CmdSetScissorWithCount) X(CmdSetBlendConstants) \
     X(CmdSetStencilReference) X(CmdBindVertexBuffers) X(CmdBindIndexBuffer) X(CmdDraw) \
-    X(CmdDrawIndexed) X(CmdDrawIndirect) X(CmdDrawIndexedIndirect) X(CmdCopyBuffer) X(CmdFillBuffer) \
+    X(CmdDrawIndexed) X(CmdDrawIndirect) X(CmdDrawIndexedIndirect) \
+    X(CmdDrawIndirectCount) X(CmdDrawIndexedIndirectCount) X(CmdCopyBuffer) X(CmdFillBuffer) \
     X(CmdCopyBufferToImage) X(CmdCopyImageToBuffer) X(CmdCopyImage) X(CmdClearColorImage) \
     X(CmdClearDepthStencilImage) X(CmdBlitImage) X(CmdResetQueryPool) X(CmdBeginQuery) \
     X(CmdEndQuery) X(CmdWriteTimestamp2)
@@ -66,6 +67,9 @@ namespace glint::vulkan {
 #define GLINT_VULKAN_TRAVERSAL_FUNCTIONS(X) \
     X(CreateRayTracingPipelinesKHR) X(GetRayTracingShaderGroupHandlesKHR) X(CmdTraceRaysKHR) \
     X(CmdTraceRaysIndirectKHR)
+
+#define GLINT_VULKAN_MESH_FUNCTIONS(X) \
+    X(CmdDrawMeshTasksEXT) X(CmdDrawMeshTasksIndirectEXT) X(CmdDrawMeshTasksIndirectCountEXT)
 // clang-format on
 
 #define GLINT_VULKAN_MEMBER(name) PFN_vk##name name = nullptr;
@@ -90,13 +94,14 @@ struct InstanceFunctions {
     void load(PFN_vkGetInstanceProcAddr get, VkInstance instance);
 };
 
-/// Functions of one device. Those of swapchains, acceleration structures and ray-tracing pipelines are nullptr where
-/// the device does not enable them.
+/// Functions of one device. Those of swapchains, acceleration structures, ray-tracing pipelines and mesh shaders are
+/// nullptr where the device does not enable them.
 struct DeviceFunctions {
     GLINT_VULKAN_DEVICE_FUNCTIONS(GLINT_VULKAN_MEMBER)
     GLINT_VULKAN_SWAPCHAIN_FUNCTIONS(GLINT_VULKAN_MEMBER)
     GLINT_VULKAN_TRACING_FUNCTIONS(GLINT_VULKAN_MEMBER)
     GLINT_VULKAN_TRAVERSAL_FUNCTIONS(GLINT_VULKAN_MEMBER)
+    GLINT_VULKAN_MESH_FUNCTIONS(GLINT_VULKAN_MEMBER)
 
     void load(PFN_vkGetDeviceProcAddr get, VkDevice device);
 };

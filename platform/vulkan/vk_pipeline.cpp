@@ -139,8 +139,6 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     tessellation.patchControlPoints = 3;
 
     VkPipelineViewportStateCreateInfo viewport = {VK_STRUCTURE_TYPE_PIPELINE_VIEWPORT_STATE_CREATE_INFO};
-    viewport.viewportCount = 1;
-    viewport.scissorCount = 1;
 
     VkPipelineRasterizationStateCreateInfo raster = {VK_STRUCTURE_TYPE_PIPELINE_RASTERIZATION_STATE_CREATE_INFO};
     raster.depthClampEnable = desc.depth_clamp;
@@ -173,8 +171,9 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     blending.attachmentCount = static_cast<uint32_t>(blends.size());
     blending.pAttachments = blends.data();
 
-    constexpr VkDynamicState dynamic_states[] = {VK_DYNAMIC_STATE_VIEWPORT, VK_DYNAMIC_STATE_SCISSOR,
-                                                 VK_DYNAMIC_STATE_BLEND_CONSTANTS, VK_DYNAMIC_STATE_STENCIL_REFERENCE};
+    constexpr VkDynamicState dynamic_states[] = {VK_DYNAMIC_STATE_VIEWPORT_WITH_COUNT,
+                                                 VK_DYNAMIC_STATE_SCISSOR_WITH_COUNT, VK_DYNAMIC_STATE_BLEND_CONSTANTS,
+                                                 VK_DYNAMIC_STATE_STENCIL_REFERENCE};
     VkPipelineDynamicStateCreateInfo dynamic = {VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO};
     dynamic.dynamicStateCount = static_cast<uint32_t>(std::size(dynamic_states));
     dynamic.pDynamicStates = dynamic_states;

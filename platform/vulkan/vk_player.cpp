@@ -156,7 +156,9 @@ void Player::playCommand(const CommandHeader& header) {
         case CommandType::Draw:
         case CommandType::DrawIndexed: return play(as<DrawCommand>(header));
         case CommandType::DrawIndirect:
-        case CommandType::DrawIndexedIndirect: return play(as<DrawIndirectCommand>(header));
+        case CommandType::DrawIndexedIndirect:
+        case CommandType::DrawMeshIndirect: return play(as<DrawIndirectCommand>(header));
+        case CommandType::DrawMesh: return play(as<DrawMeshCommand>(header));
         case CommandType::CopyInline: return play(as<CopyInlineCommand>(header));
         case CommandType::CopyBuffer: return play(as<CopyBufferCommand>(header));
         case CommandType::FillBuffer: return play(as<FillBufferCommand>(header));

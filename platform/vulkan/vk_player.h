@@ -90,6 +90,7 @@ private:
     void play(const detail::BeginTargetCommand& command);
     void play(const detail::EndTargetCommand& command);
     void play(const detail::DrawCommand& command);
+    void play(const detail::DrawMeshCommand& command);
     void play(const detail::DrawIndirectCommand& command);
     void beginPart(bool is_first);
     bool attach(const detail::Attachment& attachment, bool is_depth, bool is_first, VkRenderingAttachmentInfo& info);

@@ -126,12 +126,16 @@ bool Player::attach(const Attachment& attachment, bool is_depth, bool is_first, 
 
 void Player::setDynamicState(const DynamicState& state) {
     // Negative height turns clip space's +Y up; see vk_pipeline.cpp.
-    const Viewport& from = state.viewport;
-    const VkViewport viewport = {from.x,       from.y + from.height, from.width,
-                                 -from.height, from.minimum_depth,   from.maximum_depth};
-    vk_.CmdSetViewport(commands_, 0, 1, &viewport);
-    const VkRect2D scissor = {{state.scissor.x, state.scissor.y}, {state.scissor.width, state.scissor.height}};
-    vk_.CmdSetScissor(commands_, 0, 1, &scissor);
+    const auto* from = state.viewport_count > 1 ? list_->at<Viewport>(state.viewports) : &state.viewport;
+    VkViewport viewports[max_viewports];
+    VkRect2D scissors[max_viewports];
+    for (uint32_t i = 0; i < state.viewport_count; i++, from++) {
+        viewports[i] = {from->x,       from->y + from->height, from->width,
+                        -from->height, from->minimum_depth,    from->maximum_depth};
+        scissors[i] = {{state.scissor.x, state.scissor.y}, {state.scissor.width, state.scissor.height}};
+    }
+    vk_.CmdSetViewportWithCount(commands_, state.viewport_count, viewports);
+    vk_.CmdSetScissorWithCount(commands_, state.viewport_count, scissors);
     vk_.CmdSetBlendConstants(commands_, state.blend);
     vk_.CmdSetStencilReference(commands_, VK_STENCIL_FACE_FRONT_AND_BACK, state.stencil_reference);
 }
@@ -181,14 +185,26 @@ void Player::play(const DrawCommand& command) {
     }
 }
 
+void Player::play(const DrawMeshCommand& command) {
+    if (!bindDraw(command.state)) return;
+    vk_.CmdDrawMeshTasksEXT(commands_, command.groups[0], command.groups[1], command.groups[2]);
+}
+
 void Player::play(const DrawIndirectCommand& command) {
     if (!bindDraw(command.state)) return;
     const VkBuffer arguments = buffer(command.buffer).handle();
-    if (command.header.type == CommandType::DrawIndirect) {
-        vk_.CmdDrawIndirect(commands_, arguments, command.offset, command.draws, command.stride);
-    } else {
-        vk_.CmdDrawIndexedIndirect(commands_, arguments, command.offset, command.draws, command.stride);
+    const CommandType type = command.header.type;
+    if (command.count_buffer == none) {
+        const auto draw = type == CommandType::DrawIndirect          ? vk_.CmdDrawIndirect
+                          : type == CommandType::DrawIndexedIndirect ? vk_.CmdDrawIndexedIndirect
+                                                                     : vk_.CmdDrawMeshTasksIndirectEXT;
+        return draw(commands_, arguments, command.offset, command.draws, command.stride);
     }
+    const auto draw = type == CommandType::DrawIndirect          ? vk_.CmdDrawIndirectCount
+                      : type == CommandType::DrawIndexedIndirect ? vk_.CmdDrawIndexedIndirectCount
+                                                                 : vk_.CmdDrawMeshTasksIndirectCountEXT;
+    draw(commands_, arguments, command.offset, buffer(command.count_buffer).handle(), command.count_offset,
+         command.draws, command.stride);
 }
 
 }  // namespace glint::vulkan

@@ -221,6 +221,46 @@ TEST_F(TargetTest, AverageOfSamples) {
     EXPECT_EQ(countPixels(pixels(resolved), {51, 102, 153, 204}), 16u);
 }
 
+TEST_F(TargetTest, FirstSampleOfDepthAndStencil) {
+    for (const Format format : {FormatDf32, FormatDu24Su8, FormatDf32Su8}) {
+        if (!device.hasTexture(format, Texture::FlagTarget | Texture::FlagMultisample4)) continue;
+        SCOPED_TRACE(toString(format));
+        const Texture color = makeTexture(FormatRGBAu8n, 8, 8, Texture::FlagTarget | Texture::FlagMultisample4);
+        const Texture depth = makeTexture(format, 8, 8, Texture::FlagTarget | Texture::FlagMultisample4);
+        const Texture first = makeTexture(format, 8, 8);
+        const Texture resolved = makeTexture(FormatRGBAu8n, 8, 8);
+        Target target = device.createTarget(color, depth);
+        target.setDepthResolve(first);
+        target.setClearDepth(0.75f, 3);
+        Command list = device.createCommand(target);
+        list.setPipeline(makePipeline(cover_vertex, red_fragment, [&](Pipeline& p) {
+            p.setMultisample(4);
+            p.setDepthFormat(format);
+            p.setDepthFunc(Pipeline::DepthFuncLess);
+        }));
+        list.setScissor(0, 0, 4, 8);
+        list.drawArrays(3);
+        submit(list);
+        // Drawn against it: what is not nearer than the resolved depth stays.
+        Target next = device.createTarget(resolved, first);
+        next.setDepthOperation(Target::BeginLoad | Target::EndStore);
+        const bool has_stencil = formatInfo(format).stencil;
+        Command second = device.createCommand(next);
+        second.setPipeline(makePipeline(cover_vertex, red_fragment, [&](Pipeline& p) {
+            p.setDepthFormat(format);
+            p.setDepthFunc(Pipeline::DepthFuncLess);
+            if (has_stencil)
+                p.setStencilFunc(Pipeline::DepthFuncEqual, Pipeline::StencilOpKeep, Pipeline::StencilOpKeep,
+                                 Pipeline::StencilOpKeep);
+        }));
+        second.setStencilRef(3);
+        second.drawArrays(3);
+        submit(second);
+        const std::vector<Pixel> picture = pixels(resolved);
+        for (uint32_t i = 0; i < 64; i++) EXPECT_EQ(picture[i], i % 8 < 4 ? black : red) << i;
+    }
+}
+
 TEST_F(TargetTest, SmallestTextureBounds) {
     const Texture color = makeTexture(FormatRGBAu8n, 8, 8);
     const Texture depth = makeTexture(FormatDf32, 8, 8);

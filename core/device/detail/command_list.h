@@ -84,6 +84,8 @@ enum class CommandType : uint8_t {
     DrawIndexed,
     DrawIndirect,
     DrawIndexedIndirect,
+    DrawMesh,
+    DrawMeshIndirect,
     CopyInline,  ///< inline data to a buffer
     CopyBuffer,
     FillBuffer,
@@ -209,6 +211,7 @@ struct Attachment {
 };
 
 constexpr uint32_t max_targets = 8;
+constexpr uint32_t max_viewports = 16;
 
 struct BeginTargetCommand {
     CommandHeader header;
@@ -227,10 +230,6 @@ struct EndTargetCommand {
 struct VertexBinding {
     uint32_t buffer = none;
     uint64_t offset = 0;
-};
-
-struct Viewport {
-    float x = 0, y = 0, width = 0, height = 0, minimum_depth = 0, maximum_depth = 1;
 };
 
 struct Scissor {
@@ -253,7 +252,9 @@ struct DrawState {
 
 struct DynamicState {
     Viewport viewport;
-    Scissor scissor;
+    uint32_t viewports = none;  ///< byte offset in CommandList::bytes of the array of Viewport, if there are several
+    uint32_t viewport_count = 1;
+    Scissor scissor;  ///< of all viewports
     float blend[4] = {0, 0, 0, 0};
     uint32_t stencil_reference = 0;
 };
@@ -268,14 +269,27 @@ struct DrawCommand {
     uint32_t first_instance = 0;
 };
 
+struct DrawMeshCommand {
+    CommandHeader header;
+    DrawState state;
+    uint32_t groups[3] = {1, 1, 1};
+};
+
 struct DrawIndirectCommand {
-    CommandHeader header;  ///< DrawIndirect or DrawIndexedIndirect
+    CommandHeader header;  ///< DrawIndirect, DrawIndexedIndirect or DrawMeshIndirect
     DrawState state;
     uint32_t buffer = 0;
     uint64_t offset = 0;
-    uint32_t draws = 1;
+    uint32_t draws = 1;  ///< at most, with a count
     uint32_t stride = 0;
+    uint32_t count_buffer = none;  ///< holds a uint32_t, the number of draws
+    uint64_t count_offset = 0;
 };
+
+/// Bytes of the arguments of one draw.
+constexpr uint32_t indirectSize(CommandType type) {
+    return type == CommandType::DrawMeshIndirect ? 12 : type == CommandType::DrawIndexedIndirect ? 20 : 16;
+}
 
 struct CopyInlineCommand {
     CommandHeader header;

@@ -201,6 +201,8 @@ public:
         std::vector<std::vector<SpecializationValue>> constants;
         const Reflection* find(ShaderStage stage) const;
         StageDesc desc(size_t index) const;
+        /// Of a stage with groups, as its constants say.
+        std::array<uint32_t, 3> groupSize(size_t index) const;
     };
 
     /// In the place of one of the same stage.
@@ -273,9 +275,11 @@ public:
 
     PipelineDesc desc;  ///< blends and layout are completed by create(); stages stay empty
     std::vector<Pipeline::VertexAttribute> attributes;  ///< as they were added
+    bool has_mesh = false;                              ///< a mesh shader in the place of a vertex shader
 
 private:
     Error checkStages(const Stages& stages, Where where) const;
+    Error checkMesh(const Stages& stages, Where where) const;
     Error checkAttributes(const Reflection& vertex, Where where) const;
     Error checkTargets(const PipelineDesc& complete, const Reflection* fragment, Where where) const;
     Error checkState(const PipelineDesc& complete, Where where) const;

@@ -106,13 +106,23 @@ public:
     void setIndexBuffer(Format format, const Buffer& buffer, uint64_t offset, Where where);
     void setIndexData(Format format, const void* data, uint64_t size, Where where);
     void setViewport(const Viewport& viewport);
+    void setViewports(std::span<const Viewport> viewports, Where where);
     void setScissor(const Scissor& scissor);
     void setBlendFactor(const Color& color);
     void setStencilRef(uint32_t reference);
     void draw(bool indexed, uint32_t count, uint32_t instances, uint32_t first, int32_t base_vertex,
               uint32_t first_instance, Where where);
-    void drawIndirect(bool indexed, const Buffer& buffer, uint64_t offset, uint32_t draws, uint32_t stride,
-                      Where where);
+    /// Where the arguments of an indirect command are; `count` may be null.
+    struct Indirect {
+        const Buffer& buffer;
+        uint64_t offset = 0;
+        uint32_t draws = 1;
+        uint32_t stride = 0;
+        const Buffer* count = nullptr;
+        uint64_t count_offset = 0;
+    };
+    void drawIndirect(CommandType type, const Indirect& arguments, Where where);
+    void drawMesh(uint32_t x, uint32_t y, uint32_t z, Where where);
 
     /// Keeps the first error and reports it.
     void fail(const Error& error);
@@ -240,7 +250,10 @@ private:
     void accessBound(const ShaderResource& resource, SlotKind kind, const Bound& bound);
     bool flushPush(const char* what, Where where);
     void shareAccesses(CommandHeader& header) const;
-    bool flushDraw(bool indexed, DrawState& state, Where where);
+    bool checkViewport(const Viewport& viewport, Where where);
+    enum class DrawKind : uint8_t { Arrays, Elements, Mesh };
+    bool flushDraw(DrawKind kind, DrawState& state, Where where);
+    bool flushVertices(bool indexed, DrawState& state, Where where);
     bool checkTexture(const ShaderResource& resource, const TextureObject& texture, const Slice& slice) const;
 
     DeviceObject* const device_;

@@ -55,6 +55,9 @@ void RecorderCore::beginTarget(TargetObject& target, Where where) {
         target_height_ = height;
         layers = std::min<uint32_t>(layers, attachment.slice.layers);
     }
+    if (const uint32_t limit = device_->features().maxTargetLayers; layers > limit)
+        return fail(where, ErrorCode::OutOfRange, "target.layers", "{}: {} layers, the device draws to {} at once",
+                    target.label(), layers, limit);
 
     const auto resource = [&](const Ref<TextureObject>& texture) { return texture ? use(*texture) : none; };
     const auto fill = [&](const TargetObject::Attachment& from, Attachment& to) {
@@ -174,7 +177,32 @@ void RecorderCore::setIndexData(Format format, const void* data, uint64_t size, 
 
 void RecorderCore::setViewport(const Viewport& viewport) {
     dynamic_.viewport = viewport;
+    dynamic_.viewport_count = 1;
     dynamic_dirty_ = true;
+}
+
+void RecorderCore::setViewports(std::span<const Viewport> viewports, Where where) {
+    if (!recording(where)) return;
+    const uint32_t limit = device_->features().maxViewports;
+    if (viewports.empty() || viewports.size() > limit)
+        return fail(where, ErrorCode::OutOfRange, "draw.viewports", "setViewports: {} viewports of 1 to {}",
+                    viewports.size(), limit);
+    for (const Viewport& viewport : viewports)
+        if (!checkViewport(viewport, where)) return;
+    dynamic_.viewport = viewports[0];
+    dynamic_.viewport_count = static_cast<uint32_t>(viewports.size());
+    dynamic_.viewports = append(viewports.data(), viewports.size_bytes());
+    dynamic_dirty_ = true;
+}
+
+bool RecorderCore::checkViewport(const Viewport& viewport, Where where) {
+    const auto within = [](float depth) { return depth >= 0 && depth <= 1; };
+    if (viewport.width > 0 && viewport.height > 0 && within(viewport.minimum_depth) && within(viewport.maximum_depth))
+        return true;
+    fail(where, ErrorCode::InvalidArgument, "draw.viewport",
+         "draw: the viewport has {}x{} pixels, depth {} to {}; sizes are positive, depths in 0..1", viewport.width,
+         viewport.height, viewport.minimum_depth, viewport.maximum_depth);
+    return false;
 }
 
 void RecorderCore::setScissor(const Scissor& scissor) {
@@ -201,19 +229,18 @@ void RecorderCore::setStencilRef(uint32_t reference) {
     dynamic_dirty_ = true;
 }
 
-bool RecorderCore::flushDraw(bool indexed, DrawState& state, Where where) {
+bool RecorderCore::flushDraw(DrawKind kind, DrawState& state, Where where) {
     if (!program_) {
         fail(where, ErrorCode::InvalidArgument, "draw.pipeline", "draw: no pipeline has been set");
         return false;
     }
-    const Viewport& viewport = dynamic_.viewport;
-    if (!(viewport.width > 0) || !(viewport.height > 0) || !(viewport.minimum_depth >= 0) ||
-        !(viewport.minimum_depth <= 1) || !(viewport.maximum_depth >= 0) || !(viewport.maximum_depth <= 1)) {
-        fail(where, ErrorCode::InvalidArgument, "draw.viewport",
-             "draw: the viewport has {}x{} pixels, depth {} to {}; sizes are positive, depths in 0..1", viewport.width,
-             viewport.height, viewport.minimum_depth, viewport.maximum_depth);
+    const bool has_mesh = static_cast<const PipelineObject*>(program_)->has_mesh;
+    if (has_mesh != (kind == DrawKind::Mesh)) {
+        fail(where, ErrorCode::InvalidArgument, "draw.mesh", "draw: {} has {} shader, which {}", program_->label(),
+             has_mesh ? "a mesh" : "a vertex", has_mesh ? "drawMesh starts" : "drawMesh does not start");
         return false;
     }
+    if (!checkViewport(dynamic_.viewport, where)) return false;
     const bool new_bindings = bindings_dirty_;
     if (!flushBindings("draw", where) || !flushPush("draw", where)) return false;
     if (new_bindings) {
@@ -237,6 +264,26 @@ bool RecorderCore::flushDraw(bool indexed, DrawState& state, Where where) {
             return false;
         }
     }
+    if (dynamic_dirty_) {
+        dynamic_block_ = append(&dynamic_, sizeof(dynamic_));
+        dynamic_dirty_ = false;
+    }
+    state.pipeline = program_resource_;
+    state.bindings = bindings_;
+    state.dynamic = dynamic_block_;
+    if (kind != DrawKind::Mesh) return flushVertices(kind == DrawKind::Elements, state, where);
+    // Vulkan counts vertices that mesh shaders do not have (VUID-vkCmdDrawMeshTasksEXT-pipelineStatistics-07076).
+    for (const Query& open : open_queries_) {
+        if (open.getType() != Query::TypeStatistics) continue;
+        fail(where, ErrorCode::InvalidArgument, "query.mesh", "draw: {} is open, which counts no mesh shaders",
+             open.object()->label());
+        return false;
+    }
+    beginAccesses();
+    return true;
+}
+
+bool RecorderCore::flushVertices(bool indexed, DrawState& state, Where where) {
     const PipelineDesc& desc = static_cast<const PipelineObject*>(program_)->desc;
     if (vertices_dirty_) {
         VertexBinding bindings[std::tuple_size_v<decltype(vertices_)>];
@@ -261,12 +308,6 @@ bool RecorderCore::flushDraw(bool indexed, DrawState& state, Where where) {
         fail(where, ErrorCode::InvalidArgument, "draw.indices", "draw: no index buffer has been set");
         return false;
     }
-    if (dynamic_dirty_) {
-        dynamic_block_ = append(&dynamic_, sizeof(dynamic_));
-        dynamic_dirty_ = false;
-    }
-    state.pipeline = program_resource_;
-    state.bindings = bindings_;
     state.vertices = vertex_block_;
     state.vertex_count = vertex_block_count_;
     if (indexed) {
@@ -274,7 +315,6 @@ bool RecorderCore::flushDraw(bool indexed, DrawState& state, Where where) {
         state.index_size = index_size_;
         state.index_offset = indices_.offset;
     }
-    state.dynamic = dynamic_block_;
     beginAccesses();
     for (uint32_t i = 0; i < vertex_block_count_; i++)
         if (vertices_[i].buffer != none) access(vertices_[i].buffer, Stage::VertexInput, AccessRead);
@@ -286,7 +326,7 @@ void RecorderCore::draw(bool indexed, uint32_t count, uint32_t instances, uint32
                         uint32_t first_instance, Where where) {
     if (!recording(where) || count == 0 || instances == 0) return;
     DrawState state;
-    if (!flushDraw(indexed, state, where)) return;
+    if (!flushDraw(indexed ? DrawKind::Elements : DrawKind::Arrays, state, where)) return;
     if (indexed && (static_cast<uint64_t>(first) + count) * index_size_ > indices_.size)
         return fail(where, ErrorCode::OutOfRange, "draw.index_range",
                     "draw: {} indices from {} exceed an index buffer of {} indices", count, first,
@@ -313,32 +353,76 @@ void RecorderCore::draw(bool indexed, uint32_t count, uint32_t instances, uint32
     command.first_instance = first_instance;
 }
 
-void RecorderCore::drawIndirect(bool indexed, const Buffer& buffer, uint64_t offset, uint32_t draws, uint32_t stride,
-                                Where where) {
-    if (!recording(where) || draws == 0) return;
-    BufferObject* object = usableBuffer(buffer, Buffer::FlagIndirect, "drawIndirect", where);
+void RecorderCore::drawMesh(uint32_t x, uint32_t y, uint32_t z, Where where) {
+    if (!recording(where) || x == 0 || y == 0 || z == 0) return;
+    DrawState state;
+    if (!flushDraw(DrawKind::Mesh, state, where)) return;
+    const Features& limits = device_->features();
+    // Two factors at a time: the product of three may not fit.
+    const bool within = x <= limits.maxMeshGroupCountX && y <= limits.maxMeshGroupCountY &&
+                        z <= limits.maxMeshGroupCountZ && static_cast<uint64_t>(x) * y <= limits.maxMeshGroupCount / z;
+    if (!within)
+        return fail(where, ErrorCode::OutOfRange, "draw.mesh_groups",
+                    "drawMesh: {} x {} x {} groups, the device takes {} x {} x {} and {} in all", x, y, z,
+                    limits.maxMeshGroupCountX, limits.maxMeshGroupCountY, limits.maxMeshGroupCountZ,
+                    limits.maxMeshGroupCount);
+    auto& command = push<DrawMeshCommand>(CommandType::DrawMesh);
+    shareAccesses(command.header);
+    command.state = state;
+    const uint32_t groups[] = {x, y, z};
+    std::copy(groups, groups + 3, command.groups);
+}
+
+void RecorderCore::drawIndirect(CommandType type, const Indirect& arguments, Where where) {
+    if (!recording(where) || arguments.draws == 0) return;
+    BufferObject* object = usableBuffer(arguments.buffer, Buffer::FlagIndirect, "drawIndirect", where);
     if (!object) return;
-    const uint32_t size = indexed ? 20 : 16;
-    if (stride == 0) stride = size;
+    const auto [buffer, offset, draws, asked_stride, count, count_offset] = arguments;
+    const uint32_t size = indirectSize(type);
+    const uint32_t stride = asked_stride ? asked_stride : size;
     if (offset % 4 || stride % 4 || stride < size || offset > object->size ||
         (draws - 1ull) * stride + size > object->size - offset)
         return fail(where, ErrorCode::OutOfRange, "draw.indirect",
                     "drawIndirect: {} draws of {} bytes, {} apart, from offset {} of {} of {} bytes; multiples of 4",
                     draws, size, stride, offset, object->label(), object->size);
-    if (draws > 1 && !device_->features().has(FeatureMultiDrawIndirect))
-        return fail(where, ErrorCode::Unsupported, "draw.multi", "drawIndirect: {} draws need the feature {}", draws,
-                    toString(FeatureMultiDrawIndirect));
+    const Features& features = device_->features();
+    const auto lacks = [&](const char* id, const char* what, Feature feature) {
+        fail(where, ErrorCode::Unsupported, id, "drawIndirect: {} needs the feature {}", what, toString(feature));
+    };
+    BufferObject* counter = nullptr;
+    if (count) {
+        if (!features.has(FeatureIndirectCount))
+            return lacks("draw.count", "a count from a buffer", FeatureIndirectCount);
+        counter = usableBuffer(*count, Buffer::FlagIndirect, "drawIndirect", where);
+        if (!counter) return;
+        if (count_offset % 4 || counter->size < 4 || count_offset > counter->size - 4)
+            return fail(where, ErrorCode::OutOfRange, "draw.count",
+                        "drawIndirect: a count at offset {} of {} of {} bytes; it has 4 bytes, at a multiple of 4",
+                        count_offset, counter->label(), counter->size);
+    } else if (draws > 1 && !features.has(FeatureMultiDrawIndirect)) {
+        return lacks("draw.multi", "more than one draw", FeatureMultiDrawIndirect);
+    }
+    if (draws > features.maxIndirectDraws)
+        return fail(where, ErrorCode::OutOfRange, "draw.multi", "drawIndirect: {} draws, the device takes {} at once",
+                    draws, features.maxIndirectDraws);
     const uint32_t resource = use(*object);
+    const uint32_t counter_resource = counter ? use(*counter) : none;
     DrawState state;
-    if (!flushDraw(indexed, state, where)) return;
+    const DrawKind kind = type == CommandType::DrawMeshIndirect      ? DrawKind::Mesh
+                          : type == CommandType::DrawIndexedIndirect ? DrawKind::Elements
+                                                                     : DrawKind::Arrays;
+    if (!flushDraw(kind, state, where)) return;
     access(resource, Stage::Indirect, AccessRead);
-    auto& command = push<DrawIndirectCommand>(indexed ? CommandType::DrawIndexedIndirect : CommandType::DrawIndirect);
+    if (counter) access(counter_resource, Stage::Indirect, AccessRead);
+    auto& command = push<DrawIndirectCommand>(type);
     shareAccesses(command.header);
     command.state = state;
     command.buffer = resource;
     command.offset = offset;
     command.draws = draws;
     command.stride = stride;
+    command.count_buffer = counter_resource;
+    command.count_offset = count_offset;
 }
 
 }  // namespace glint::detail

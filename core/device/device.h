@@ -13,6 +13,7 @@
 #include <glint/device/query.h>
 #include <glint/device/sampler.h>
 #include <glint/device/shader.h>
+#include <glint/device/table.h>
 #include <glint/device/target.h>
 #include <glint/device/texture.h>
 #include <glint/device/tracing.h>
@@ -119,6 +120,10 @@ public:
     Sampler createSampler(const SamplerDesc& desc = {}, std::string_view name = {}, Where where = Where::current());
     Sampler createSampler(Sampler::Filter filter, Sampler::WrapMode wrap = Sampler::WrapModeClamp,
                           Where where = Where::current());
+
+    /// Tables of `count` entries, with nothing in them. Errors: "table.feature", "table.count".
+    TextureTable createTextureTable(uint32_t count, std::string_view name = {}, Where where = Where::current());
+    BufferTable createBufferTable(uint32_t count, std::string_view name = {}, Where where = Where::current());
 
     Kernel createKernel(std::string_view name = {}, Where where = Where::current());
     Pipeline createPipeline(std::string_view name = {}, Where where = Where::current());

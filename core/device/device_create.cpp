@@ -1,5 +1,6 @@
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
+#include <glint/device/detail/table_object.h>
 #include <glint/device/detail/texture_layout.h>
 #include <glint/device/detail/window_object.h>
 #include <glint/device/device.h>
@@ -197,6 +198,41 @@ Sampler Device::createSampler(const SamplerDesc& desc, std::string_view name, Wh
 
 Sampler Device::createSampler(Sampler::Filter filter, Sampler::WrapMode wrap, Where where) {
     return createSampler(SamplerDesc{.filter = filter, .wrap = wrap}, {}, where);
+}
+
+namespace {
+
+detail::Object* createTable(const Device& device, SlotKind element, uint32_t count, std::string_view name,
+                            Device::Where where) {
+    Creation<detail::TableObject> creation(device, name, where, element);
+    detail::TableObject& table = *creation.object();
+    const Features& features = device.getFeatures();
+    const bool is_texture = element == SlotKind::Texture;
+    const Feature feature = is_texture ? FeatureTextureTable : FeatureBufferTable;
+    const uint32_t limit = is_texture ? features.maxTableTextures : features.maxTableBuffers;
+    creation.check(features.has(feature), ErrorCode::Unsupported, "table.feature",
+                   "it needs the feature {}, which {} lacks", toString(feature), device.getInfo().name);
+    creation.check(count >= 1 && count <= limit, ErrorCode::OutOfRange, "table.count", "{} entries of 1 to {}", count,
+                   limit);
+    if (creation.failed()) return &table;
+    auto contents = detail::TableObject::makeContents(*creation.device(), element, count, std::string(name));
+    if (!contents) {
+        table.fail(contents.error().at(where));
+    } else {
+        table.contents = std::move(*contents);
+        table.setReady();
+    }
+    return &table;
+}
+
+}  // namespace
+
+TextureTable Device::createTextureTable(uint32_t count, std::string_view name, Where where) {
+    return TextureTable(createTable(*this, SlotKind::Texture, count, name, where));
+}
+
+BufferTable Device::createBufferTable(uint32_t count, std::string_view name, Where where) {
+    return BufferTable(createTable(*this, SlotKind::Storage, count, name, where));
 }
 
 Query Device::createQuery(Query::Type type, std::string_view name, Where where) {

@@ -11,7 +11,7 @@ constexpr std::array<const char*, FeatureCount> names = {
     "shaderf16",      "shaderf64",       "shaderu8",      "shaderu16",        "shaderu64",     "atomicBufferu64",
     "geometryShader", "tessellation",    "anisotropy",    "cubeArray",        "indirectCount", "multiDrawIndirect",
     "wireframe",      "depthClamp",      "textureBC",     "samplerReduction", "statistics",    "timestamps",
-    "present",        "vertexLayer",     "multiViewport",
+    "present",        "vertexLayer",     "multiViewport", "bufferTable",
 };
 
 }  // namespace

@@ -13,7 +13,7 @@ enum Feature : uint64_t {
     FeatureRayTracing = 1ull << 2,       ///< ray-tracing pipelines
     FeatureMeshShader = 1ull << 3,       ///< task and mesh shaders
     FeatureBufferAddress = 1ull << 4,    ///< Buffer::getAddress and buffer references in shaders
-    FeatureTextureTable = 1ull << 5,     ///< arrays of textures of unknown length, indexed non-uniformly
+    FeatureTextureTable = 1ull << 5,     ///< TextureTable: arrays of textures of unknown length
     FeatureShaderf16 = 1ull << 6,
     FeatureShaderf64 = 1ull << 7,
     FeatureShaderu8 = 1ull << 8,
@@ -35,7 +35,8 @@ enum Feature : uint64_t {
     FeaturePresent = 1ull << 24,           ///< windows
     FeatureVertexLayer = 1ull << 25,       ///< gl_Layer and gl_ViewportIndex in vertex and evaluate shaders
     FeatureMultiViewport = 1ull << 26,     ///< Command::setViewports with more than one
-    FeatureCount = 27,
+    FeatureBufferTable = 1ull << 27,       ///< BufferTable: arrays of storage blocks of unknown length
+    FeatureCount = 28,
 };
 
 /// Who answers ray queries: the driver, or Glint's own hierarchies and traversal in the shader (docs/tracing.md).
@@ -67,6 +68,7 @@ struct Features {
     bool meshShader = false;
     bool bufferAddress = false;
     bool textureTable = false;
+    bool bufferTable = false;
     bool shaderf16 = false;
     bool shaderf64 = false;
     bool shaderu8 = false;
@@ -110,10 +112,12 @@ struct Features {
     uint32_t maxMeshVertices = 0;    ///< written by a group
     uint32_t maxMeshPrimitives = 0;  ///< likewise
     uint32_t maxAnisotropy = 1;
-    uint64_t maxUniformSize = 0;  ///< bytes of one uniform binding
-    uint64_t maxStorageSize = 0;  ///< bytes of one storage binding
-    uint64_t maxTexels = 0;       ///< elements of one texel binding
-    uint32_t maxSets = 0;         ///< descriptor sets of a program
+    uint64_t maxUniformSize = 0;    ///< bytes of one uniform binding
+    uint64_t maxStorageSize = 0;    ///< bytes of one storage binding
+    uint64_t maxTexels = 0;         ///< elements of one texel binding
+    uint32_t maxTableTextures = 0;  ///< entries of one TextureTable
+    uint32_t maxTableBuffers = 0;   ///< entries of one BufferTable
+    uint32_t maxSets = 0;           ///< descriptor sets of a program
     uint64_t maxBufferSize = 0;
     uint64_t maxTracingInstances = 0;
     uint64_t maxTracingPrimitives = 0;

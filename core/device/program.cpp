@@ -21,6 +21,8 @@ using Type = SpecializationConstant::Type;
 constexpr uint32_t max_slots = 4096;
 /// Of one array in the software engine: a uniform block of references holds no more everywhere.
 constexpr uint32_t max_tracings = 1024;
+/// Of one program; back ends make room for as many of the largest.
+constexpr size_t max_tables = 4;
 
 const char* toString(Type type) {
     switch (type) {
@@ -314,6 +316,7 @@ Expected<BindingLayout> ProgramObject::mergeStages(const Stages& stages, Where w
     if (!merged) return unexpected(merged.error().at(where).named(name()));
     for (const ShaderResource& resource : merged->resources)
         if (Error error = checkResource(resource, where)) return unexpected(error);
+    if (Error error = checkTables(*merged, where)) return unexpected(error);
     if (const uint32_t limit = device()->features().maxPushSize; merged->push_size > limit)
         return unexpected(
             problem(where, ErrorCode::OutOfRange, "program.push_size",
@@ -341,17 +344,24 @@ Error ProgramObject::checkFeatures(const Reflection& stage, Where where) const {
     if (stage.stage == ShaderStage::Geometry) needed |= FeatureGeometryShader;
     if (stage.stage == ShaderStage::Task || stage.stage == ShaderStage::Mesh) needed |= FeatureMeshShader;
     if (stage.stage == ShaderStage::Control || stage.stage == ShaderStage::Evaluate) needed |= FeatureTessellation;
-    for (const ShaderResource& resource : stage.resources)
+    for (const ShaderResource& resource : stage.resources) {
         if (resource.dimension == ImageDimension::CubeArray) needed |= FeatureCubeArray;
+        if (resource.kind != SlotKind::Table) continue;
+        if (resource.element == SlotKind::Texture) needed |= FeatureTextureTable;
+        if (resource.element == SlotKind::Storage) needed |= FeatureBufferTable;
+    }
     return missing(where, needed, fmt::format("the {} shader", glint::toString(stage.stage)));
 }
 
 Error ProgramObject::checkResource(const ShaderResource& resource, Where where) const {
-    if (resource.kind == SlotKind::Table)
-        return problem(
-            where, ErrorCode::Unsupported, "program.table",
-            fmt::format("'{}' is an array of unknown length, which this version cannot bind", resource.name));
-    if (resource.count == 0 || resource.count > max_slots)
+    const bool is_table = resource.kind == SlotKind::Table;
+    if (is_table && ((resource.element != SlotKind::Texture && resource.element != SlotKind::Storage) ||
+                     resource.combined || resource.dimension == ImageDimension::Image2DMultisample))
+        return problem(where, ErrorCode::Unsupported, "program.table",
+                       fmt::format("'{}' is an array of unknown length; tables hold textures without samplers or "
+                                   "samples (texture2D), and storage blocks",
+                                   resource.name));
+    if (!is_table && (resource.count == 0 || resource.count > max_slots))
         return problem(
             where, ErrorCode::OutOfRange, "program.array",
             fmt::format("'{}' has {} elements, at most {} can be bound", resource.name, resource.count, max_slots));
@@ -364,6 +374,23 @@ Error ProgramObject::checkResource(const ShaderResource& resource, Where where) 
         return problem(
             where, ErrorCode::OutOfRange, "program.uniform_size",
             fmt::format("uniform block '{}' has {} bytes, the device takes {}", resource.name, resource.size, limit));
+    return {};
+}
+
+Error ProgramObject::checkTables(const BindingLayout& merged, Where where) const {
+    const std::vector<uint32_t>& tables = merged.slots[static_cast<size_t>(SlotKind::Table)];
+    if (tables.size() > max_tables)
+        return problem(where, ErrorCode::OutOfRange, "program.table",
+                       fmt::format("{} tables, a program has at most {}", tables.size(), max_tables));
+    for (const uint32_t index : tables) {
+        const ShaderResource& table = merged.resources[index];
+        for (const auto* resources : {&merged.resources, &merged.hidden})
+            for (const ShaderResource& other : *resources)
+                if (&other != &table && other.set == table.set)
+                    return problem(where, ErrorCode::InvalidArgument, "program.table",
+                                   fmt::format("table '{}' has to be alone in set {}, where '{}' is, too", table.name,
+                                               table.set, other.name));
+    }
     return {};
 }
 
@@ -518,6 +545,10 @@ void Program::setTracingMask(uint32_t index, Shader::Mask mask, Where where) {
 }
 void Program::setTexelMask(uint32_t index, Shader::Mask mask, Where where) {
     declareSlots(SlotKind::Texel, index, 1, mask, where);
+}
+
+void Program::setTableMask(uint32_t index, Shader::Mask mask, Where where) {
+    declareSlots(SlotKind::Table, index, 1, mask, where);
 }
 
 uint32_t Program::getSlots(SlotKind kind) const {

@@ -44,6 +44,7 @@ public:
     void setSamplerMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
     void setTracingMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
     void setTexelMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
+    void setTableMask(uint32_t index, Shader::Mask mask, Where where = Where::current());
 
     /// Makes the native object from the stages set; what is configured afterwards changes nothing and is told to the
     /// message callback: "program.created", as for a second call. Errors: "program.*", "kernel.*", "pipeline.*",

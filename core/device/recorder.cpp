@@ -75,6 +75,14 @@ void Recorder::setTracing(Slot slot, const Tracing& tracing) {
     if (core_) core_->setTracing(slot, tracing);
 }
 
+void Recorder::setTextureTable(Slot slot, const TextureTable& table) {
+    if (core_) core_->setTable(slot, table);
+}
+
+void Recorder::setBufferTable(Slot slot, const BufferTable& table) {
+    if (core_) core_->setTable(slot, table);
+}
+
 void Recorder::setTexelBuffer(Slot slot, const Buffer& buffer, Format format, uint64_t offset, uint64_t size) {
     if (core_) core_->setBuffer(SlotKind::Texel, slot, 0, buffer, offset, size, format);
 }

@@ -4,6 +4,7 @@
 #include <glint/device/buffer.h>
 #include <glint/device/query.h>
 #include <glint/device/sampler.h>
+#include <glint/device/table.h>
 #include <glint/device/texture.h>
 #include <glint/device/tracing.h>
 
@@ -100,6 +101,10 @@ public:
     void setSamplers(Slot slot, std::initializer_list<Sampler> samplers);
     /// A structure and, for a top level, all that it refers to.
     void setTracing(Slot slot, const Tracing& tracing);
+    /// A table as it is now. Slots of tables of textures and of buffers are counted together. Errors: "bind.table",
+    /// "bind.texture_type", "bind.storage_size".
+    void setTextureTable(Slot slot, const TextureTable& table);
+    void setBufferTable(Slot slot, const BufferTable& table);
     void setTexelBuffer(Slot slot, const Buffer& buffer, Format format, uint64_t offset = 0, uint64_t size = 0);
 
     /// Push constants of the current program, from its first byte on ("bind.push_size").

@@ -85,8 +85,8 @@ struct ShaderResource {
 
     /// An acceleration structure that the software engine answers for.
     bool isRewritten() const { return kind == SlotKind::Tracing && descriptor != SlotKind::Tracing; }
-    /// Elements of the binding that the module declares.
-    uint32_t descriptorCount() const { return isRewritten() ? 1 : count; }
+    /// Elements of the binding that a list binds: a table is one.
+    uint32_t descriptorCount() const { return isRewritten() || kind == SlotKind::Table ? 1 : count; }
 };
 
 /// A specialisation constant of 32 bits or bool; wider and narrower ones are left out and keep their default.

@@ -63,6 +63,8 @@ std::vector<Limit> limitsOf(const Features& features) {
         {"maxAttributeSize", features.maxAttributeSize, "bytes"},
         {"maxPushSize", features.maxPushSize, "bytes"},
         {"maxAnisotropy", features.maxAnisotropy, ""},
+        {"maxTableTextures", features.maxTableTextures, "entries"},
+        {"maxTableBuffers", features.maxTableBuffers, "entries"},
         {"maxUniformSize", features.maxUniformSize, "bytes"},
         {"maxStorageSize", features.maxStorageSize, "bytes"},
         {"maxBufferSize", features.maxBufferSize, "bytes"},

@@ -1,6 +1,7 @@
 #include <platform/null/null_access.h>
 
 #include <glint/base/format_error.h>
+#include <glint/device/detail/table_object.h>
 
 #include <algorithm>
 
@@ -190,6 +191,16 @@ private:
     }
 
     void access(const BoundResource& bound, const ShaderResource& resource) {
+        if (resource.kind == SlotKind::Table) {
+            const auto& table = static_cast<const TableContents&>(*list_.resources[bound.resource]);
+            for (const TableContents::Entry& entry : table.entries)
+                if (entry.object) accessOne({.resource = find(entry.object.get()), .slice = entry.slice}, resource);
+        } else {
+            accessOne(bound, resource);
+        }
+    }
+
+    void accessOne(const BoundResource& bound, const ShaderResource& resource) {
         shaderAccess(bound, resource, ray_stages, Stage::RayTracing);
         shaderAccess(bound, resource, early_stages, Stage::VertexShader);
         shaderAccess(bound, resource, stageBit(ShaderStage::Fragment), Stage::Fragment);
@@ -198,7 +209,7 @@ private:
 
     void shaderAccess(const BoundResource& bound, const ShaderResource& resource, ShaderMask mask, Stage stage) {
         if (!(resource.stages & mask)) return;
-        const bool image = resource.kind == SlotKind::Texture || resource.kind == SlotKind::Surface;
+        const bool image = resource.element == SlotKind::Texture || resource.element == SlotKind::Surface;
         if (resource.read) need(bound.resource, stage, AccessRead, image ? bound.slice : Slice{}, resource.name);
         if (resource.write) need(bound.resource, stage, AccessWrite, image ? bound.slice : Slice{}, resource.name);
         if (resource.kind == SlotKind::Tracing) references(native<NullTracing>(bound.resource), stage);

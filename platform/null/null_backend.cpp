@@ -37,6 +37,9 @@ Features describeFeatures(FeatureMask mask, const NullSettings& settings) {
     features.meshShader = mask & FeatureMeshShader;
     features.bufferAddress = mask & FeatureBufferAddress;
     features.textureTable = mask & FeatureTextureTable;
+    features.bufferTable = mask & FeatureBufferTable;
+    features.maxTableTextures = features.textureTable ? 65536 : 0;
+    features.maxTableBuffers = features.bufferTable ? 65536 : 0;
     features.shaderf16 = mask & FeatureShaderf16;
     features.shaderf64 = mask & FeatureShaderf64;
     features.shaderu8 = mask & FeatureShaderu8;
@@ -155,6 +158,9 @@ public:
     }
     Expected<std::unique_ptr<NativeSampler>> createSampler(const SamplerDesc&) override {
         return create<NullSampler>(0, control_, 0, "sampler");
+    }
+    Expected<std::unique_ptr<NativeTable>> createTable(const std::string& name) override {
+        return create<NullTable>(0, control_, 0, name);
     }
     Expected<std::unique_ptr<NativeKernel>> createKernel(const KernelDesc& desc) override {
         auto made = create<NullKernel>(0, control_, 0, desc.name);

@@ -98,6 +98,10 @@ struct NullSampler final : detail::NativeSampler, NullObject {
     using NullObject::NullObject;
 };
 
+struct NullTable final : detail::NativeTable, NullObject {
+    using NullObject::NullObject;
+};
+
 struct NullKernel final : detail::NativeKernel, NullObject {
     using NullObject::NullObject;
     BindingLayout layout;

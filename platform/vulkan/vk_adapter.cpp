@@ -18,6 +18,7 @@ constexpr const char* known_extensions[] = {
     VK_KHR_RAY_QUERY_EXTENSION_NAME,
     VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME,
     VK_EXT_MESH_SHADER_EXTENSION_NAME,
+    VK_EXT_ROBUSTNESS_2_EXTENSION_NAME,
     VK_KHR_SWAPCHAIN_EXTENSION_NAME,
 };
 
@@ -37,9 +38,11 @@ FeatureMask offeredFeatures(const Instance& instance, const Adapter& adapter) {
     add(FeatureRayTracing, structures && chain.ray_pipeline.rayTracingPipeline);
     add(FeatureMeshShader, chain.mesh.meshShader && chain.mesh.taskShader);
     add(FeatureBufferAddress, chain.v12.bufferDeviceAddress);
-    add(FeatureTextureTable, chain.v12.runtimeDescriptorArray && chain.v12.descriptorBindingPartiallyBound &&
-                                 chain.v12.shaderSampledImageArrayNonUniformIndexing &&
-                                 chain.v12.descriptorBindingVariableDescriptorCount);
+    // Null descriptors are what an entry with nothing in it reads.
+    const bool tables = chain.v12.runtimeDescriptorArray && chain.v12.descriptorBindingVariableDescriptorCount &&
+                        chain.robustness.nullDescriptor;
+    add(FeatureTextureTable, tables && chain.v12.shaderSampledImageArrayNonUniformIndexing);
+    add(FeatureBufferTable, tables && chain.v12.shaderStorageBufferArrayNonUniformIndexing);
     add(FeatureShaderf16, chain.v12.shaderFloat16 && chain.v11.storageBuffer16BitAccess);
     add(FeatureShaderf64, core.shaderFloat64);
     add(FeatureShaderu8, chain.v12.shaderInt8 && chain.v12.storageBuffer8BitAccess);
@@ -112,6 +115,7 @@ void FeatureChain::link(const std::vector<std::string>& extensions) {
     add(VK_KHR_RAY_QUERY_EXTENSION_NAME, ray_query);
     add(VK_KHR_RAY_TRACING_PIPELINE_EXTENSION_NAME, ray_pipeline);
     add(VK_EXT_MESH_SHADER_EXTENSION_NAME, mesh);
+    add(VK_EXT_ROBUSTNESS_2_EXTENSION_NAME, robustness);
     *next = nullptr;
 }
 
@@ -315,11 +319,12 @@ Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
         features.v11.storagePushConstant16 = offered.v11.storagePushConstant16;
         features.v11.storageInputOutput16 = offered.v11.storageInputOutput16;
     }
-    if (mask & FeatureTextureTable) {
+    if (mask & (FeatureTextureTable | FeatureBufferTable)) {
         features.v12.descriptorIndexing = offered.v12.descriptorIndexing;
         features.v12.runtimeDescriptorArray = VK_TRUE;
-        features.v12.descriptorBindingPartiallyBound = VK_TRUE;
         features.v12.descriptorBindingVariableDescriptorCount = VK_TRUE;
+        features.robustness.nullDescriptor = VK_TRUE;
+        enabled.extensions.push_back(VK_EXT_ROBUSTNESS_2_EXTENSION_NAME);
     }
     constexpr FeatureMask queries = FeatureComputeTracing | FeatureFragmentTracing;
     features.v12.bufferDeviceAddress = (mask & (FeatureBufferAddress | queries | FeatureRayTracing)) != 0;
@@ -349,6 +354,15 @@ Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
 }
 
 namespace {
+
+/// Layouts declare tables at their largest, so a program's four, and what it has besides, have to fit.
+uint32_t tableSize(const VkPhysicalDeviceLimits& limits, SlotKind element) {
+    const bool is_texture = element == SlotKind::Texture;
+    const uint32_t stage =
+        is_texture ? limits.maxPerStageDescriptorSampledImages : limits.maxPerStageDescriptorStorageBuffers;
+    const uint32_t set = is_texture ? limits.maxDescriptorSetSampledImages : limits.maxDescriptorSetStorageBuffers;
+    return std::min({stage, set, limits.maxPerStageResources}) / 8;
+}
 
 /// Where task and mesh shaders have limits of their own, the lower one: groups are started the same way.
 void describeMesh(const VkPhysicalDeviceMeshShaderPropertiesEXT& mesh, Features& features) {
@@ -401,6 +415,7 @@ Features describeFeatures(const Instance& instance, const Adapter& adapter, Feat
     features.meshShader = (mask & FeatureMeshShader) != 0;
     features.bufferAddress = (mask & FeatureBufferAddress) != 0;
     features.textureTable = (mask & FeatureTextureTable) != 0;
+    features.bufferTable = (mask & FeatureBufferTable) != 0;
     features.shaderf16 = (mask & FeatureShaderf16) != 0;
     features.shaderf64 = (mask & FeatureShaderf64) != 0;
     features.shaderu8 = (mask & FeatureShaderu8) != 0;
@@ -445,6 +460,8 @@ Features describeFeatures(const Instance& instance, const Adapter& adapter, Feat
     features.maxUniformSize = limits.maxUniformBufferRange;
     features.maxStorageSize = limits.maxStorageBufferRange;
     features.maxTexels = limits.maxTexelBufferElements;
+    if (features.textureTable) features.maxTableTextures = tableSize(limits, SlotKind::Texture);
+    if (features.bufferTable) features.maxTableBuffers = tableSize(limits, SlotKind::Storage);
     features.maxSets = limits.maxBoundDescriptorSets;
     features.maxBufferSize = v13.maxBufferSize;
     features.maxTracingInstances = structures.maxInstanceCount;

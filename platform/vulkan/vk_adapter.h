@@ -22,6 +22,7 @@ struct FeatureChain {
     VkPhysicalDeviceRayTracingPipelineFeaturesKHR ray_pipeline = {
         VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_RAY_TRACING_PIPELINE_FEATURES_KHR};
     VkPhysicalDeviceMeshShaderFeaturesEXT mesh = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_MESH_SHADER_FEATURES_EXT};
+    VkPhysicalDeviceRobustness2FeaturesEXT robustness = {VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_ROBUSTNESS_2_FEATURES_EXT};
 
     /// Chains those whose extension is among `extensions` to `core`; to be called again for a copy.
     void link(const std::vector<std::string>& extensions);

@@ -7,6 +7,7 @@
 #include "platform/vulkan/vk_query.h"
 #include "platform/vulkan/vk_result.h"
 #include "platform/vulkan/vk_sampler.h"
+#include "platform/vulkan/vk_table.h"
 #include "platform/vulkan/vk_texture.h"
 #include "platform/vulkan/vk_tracing.h"
 #include "platform/vulkan/vk_traversal.h"
@@ -155,6 +156,12 @@ Expected<std::unique_ptr<NativeTexture>> VulkanDevice::createTexture(const Nativ
 
 Expected<std::unique_ptr<NativeSampler>> VulkanDevice::createSampler(const SamplerDesc& desc) {
     return VulkanSampler::create(*this, desc);
+}
+
+Expected<std::unique_ptr<NativeTable>> VulkanDevice::createTable(const std::string& name) {
+    auto table = std::make_unique<VulkanTable>(*this);
+    table->setName(name);
+    return table;
 }
 
 Expected<std::unique_ptr<NativeKernel>> VulkanDevice::createKernel(const KernelDesc& desc) {

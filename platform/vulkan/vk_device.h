@@ -56,6 +56,7 @@ public:
     Expected<std::unique_ptr<detail::NativeBuffer>> createBuffer(const detail::NativeBufferDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeTexture>> createTexture(const detail::NativeTextureDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeSampler>> createSampler(const SamplerDesc& desc) override;
+    Expected<std::unique_ptr<detail::NativeTable>> createTable(const std::string& name) override;
     Expected<std::unique_ptr<detail::NativeKernel>> createKernel(const detail::KernelDesc& desc) override;
     Expected<std::unique_ptr<detail::NativePipeline>> createPipeline(const detail::PipelineDesc& desc) override;
     Expected<std::unique_ptr<detail::NativeTraversal>> createTraversal(const detail::TraversalDesc& desc) override;

@@ -41,7 +41,7 @@ namespace glint::vulkan {
     X(DestroySampler) X(CreateShaderModule) X(DestroyShaderModule) X(CreateDescriptorSetLayout) \
     X(DestroyDescriptorSetLayout) X(CreatePipelineLayout) X(DestroyPipelineLayout) \
     X(CreateDescriptorUpdateTemplate) X(DestroyDescriptorUpdateTemplate) \
-    X(UpdateDescriptorSetWithTemplate) X(CreateDescriptorPool) X(DestroyDescriptorPool) \
+    X(UpdateDescriptorSets) X(UpdateDescriptorSetWithTemplate) X(CreateDescriptorPool) X(DestroyDescriptorPool) \
     X(AllocateDescriptorSets) X(CreateComputePipelines) X(CreateGraphicsPipelines) \
     X(DestroyPipeline) X(CreateQueryPool) X(DestroyQueryPool) X(ResetQueryPool) \
     X(GetQueryPoolResults) X(CmdPipelineBarrier2) X(CmdBindPipeline) X(CmdBindDescriptorSets) \

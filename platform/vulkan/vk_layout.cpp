@@ -38,7 +38,7 @@ LayoutCache::~LayoutCache() {
     for (const auto& layout : layouts_) vk.DestroyPipelineLayout(device_.handle, layout->handle, nullptr);
     for (const auto& set : sets_) {
         for (VkDescriptorPool pool : set->pools) vk.DestroyDescriptorPool(device_.handle, pool, nullptr);
-        vk.DestroyDescriptorUpdateTemplate(device_.handle, set->update, nullptr);
+        if (set->update) vk.DestroyDescriptorUpdateTemplate(device_.handle, set->update, nullptr);
         vk.DestroyDescriptorSetLayout(device_.handle, set->handle, nullptr);
     }
 }
@@ -52,13 +52,6 @@ Expected<PipelineLayout*> LayoutCache::get(const BindingLayout& source) {
     forEachResource([&](const ShaderResource& resource, uint32_t count) {
         if (resource.descriptor == SlotKind::Uniform) uniforms += count;
     });
-    for (const ShaderResource& resource : source.resources) {
-        if (resource.kind == SlotKind::Table || resource.count == 0) {
-            return unexpected(makeError(ErrorCode::Unsupported, "layout.table",
-                                        "'{}' is an array of unknown length, which cannot be bound yet",
-                                        resource.name));
-        }
-    }
     const VkPhysicalDeviceLimits& limits = device_.adapter.properties.limits;
     if (source.set_count > limits.maxBoundDescriptorSets) {
         return unexpected(makeError(ErrorCode::OutOfRange, "layout.sets", "set {} is used, the adapter has {} sets",
@@ -74,7 +67,11 @@ Expected<PipelineLayout*> LayoutCache::get(const BindingLayout& source) {
     uint32_t uniform = 0;
     forEachResource([&](const ShaderResource& resource, uint32_t count) {
         const VkDescriptorType type = descriptorType(resource, layout->dynamic);
-        bindings[resource.set].push_back({resource.binding, count, type, vulkanStages(resource.stages)});
+        const bool is_table = resource.kind == SlotKind::Table;
+        const uint32_t most = resource.element == SlotKind::Texture ? device_.features().maxTableTextures
+                                                                    : device_.features().maxTableBuffers;
+        bindings[resource.set].push_back(
+            {resource.binding, is_table ? most : count, type, vulkanStages(resource.stages), is_table});
         const bool is_uniform = resource.descriptor == SlotKind::Uniform;
         PipelineLayout::Set& set = layout->sets[resource.set];
         if (set.element_count == 0) {
@@ -87,7 +84,7 @@ Expected<PipelineLayout*> LayoutCache::get(const BindingLayout& source) {
         // A block of references has no size of its own: the structures' number gives it.
         const uint32_t size = resource.isRewritten() ? resource.count * 16 : resource.size;
         layout->elements.insert(layout->elements.end(), count,
-                                {type, resource.dimension, is_uniform, is_uniform ? size : 0});
+                                {type, resource.dimension, is_uniform, is_uniform ? size : 0, is_table});
     });
 
     const std::lock_guard lock(mutex_);
@@ -146,10 +143,18 @@ Status LayoutCache::fill(SetLayout& set) {
     VkDescriptorSetLayoutCreateInfo info = {VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_CREATE_INFO};
     info.bindingCount = static_cast<uint32_t>(bindings.size());
     info.pBindings = bindings.data();
+    // Tables are as long as each of them is, and write themselves (vk_table.h).
+    const bool is_table = set.bindings.size() == 1 && set.bindings[0].table;
+    constexpr VkDescriptorBindingFlags variable = VK_DESCRIPTOR_BINDING_VARIABLE_DESCRIPTOR_COUNT_BIT;
+    VkDescriptorSetLayoutBindingFlagsCreateInfo flags = {
+        VK_STRUCTURE_TYPE_DESCRIPTOR_SET_LAYOUT_BINDING_FLAGS_CREATE_INFO};
+    flags.bindingCount = 1;
+    flags.pBindingFlags = &variable;
+    if (is_table) info.pNext = &flags;
     VkResult result = device_.vk.CreateDescriptorSetLayout(device_.handle, &info, nullptr, &set.handle);
     if (result != VK_SUCCESS) return resultError("vkCreateDescriptorSetLayout", result);
     device_.memory.objects_created++;
-    if (entries.empty()) return {};
+    if (entries.empty() || is_table) return {};
 
     VkDescriptorUpdateTemplateCreateInfo update = {VK_STRUCTURE_TYPE_DESCRIPTOR_UPDATE_TEMPLATE_CREATE_INFO};
     update.descriptorUpdateEntryCount = static_cast<uint32_t>(entries.size());

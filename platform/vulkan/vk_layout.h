@@ -31,6 +31,7 @@ struct SetLayout {
         uint32_t count = 1;
         VkDescriptorType type = VK_DESCRIPTOR_TYPE_UNIFORM_BUFFER;
         VkShaderStageFlags stages = 0;
+        bool table = false;  ///< alone in its set, `count` at most
         bool operator==(const Binding&) const = default;
     };
 
@@ -49,6 +50,7 @@ struct LayoutElement {
     ImageDimension dimension = ImageDimension::None;
     bool uniform = false;
     uint32_t size = 0;  ///< uniforms: bytes of the block
+    bool table = false;
     bool operator==(const LayoutElement&) const = default;
 };
 
@@ -78,7 +80,7 @@ public:
     LayoutCache(const LayoutCache&) = delete;
     LayoutCache& operator=(const LayoutCache&) = delete;
 
-    /// From any thread. Errors: "layout.table" (an array of unknown length), "layout.sets", "vulkan.result", ...
+    /// From any thread. Errors: "layout.sets", "vulkan.result", ...
     Expected<PipelineLayout*> get(const BindingLayout& layout);
 
     /// Makes more free sets. Under the submit lock.

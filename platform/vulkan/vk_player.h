@@ -70,6 +70,7 @@ private:
     bool bind(BindPoint& point, const PipelineLayout& layout, const detail::Bindings& bindings);
     VkDescriptorSet writeSet(const PipelineLayout& layout, const PipelineLayout::Set& set,
                              const detail::BoundResource* elements, const uint32_t* uniforms);
+    VkDescriptorSet tableSet(const SetLayout& layout, const LayoutElement& element, uint32_t resource);
     VkDescriptorBufferInfo wholeBuffer(const detail::BoundResource& bound);
     bool writeElement(const LayoutElement& element, const detail::BoundResource& bound, uint64_t uniform_offset,
                       DescriptorData& data);

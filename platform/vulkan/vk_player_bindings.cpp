@@ -3,6 +3,7 @@
 #include "platform/vulkan/vk_format.h"
 #include "platform/vulkan/vk_player.h"
 #include "platform/vulkan/vk_sampler.h"
+#include "platform/vulkan/vk_table.h"
 #include "platform/vulkan/vk_texture.h"
 #include "platform/vulkan/vk_tracing.h"
 
@@ -15,25 +16,6 @@ namespace glint::vulkan {
 using namespace detail;
 
 namespace {
-
-/// The view type of a descriptor. A table's shader says nothing: then it follows the texture.
-VkImageViewType viewType(ImageDimension dimension, const VulkanTexture& texture, Slice& slice) {
-    switch (dimension) {
-        case ImageDimension::Image2D:
-        case ImageDimension::Image2DMultisample: slice.layers = 1; return VK_IMAGE_VIEW_TYPE_2D;
-        case ImageDimension::Image3D: return VK_IMAGE_VIEW_TYPE_3D;
-        case ImageDimension::Cube: slice.layers = 6; return VK_IMAGE_VIEW_TYPE_CUBE;
-        case ImageDimension::Image2DArray: return VK_IMAGE_VIEW_TYPE_2D_ARRAY;
-        case ImageDimension::CubeArray: return VK_IMAGE_VIEW_TYPE_CUBE_ARRAY;
-        case ImageDimension::None: break;
-    }
-    switch (texture.desc().type) {
-        case Texture::Type3D: return VK_IMAGE_VIEW_TYPE_3D;
-        case Texture::TypeCube: return slice.layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE : VK_IMAGE_VIEW_TYPE_CUBE_ARRAY;
-        case Texture::Type2D: break;
-    }
-    return slice.layers == 1 ? VK_IMAGE_VIEW_TYPE_2D : VK_IMAGE_VIEW_TYPE_2D_ARRAY;
-}
 
 bool sameBytes(const void* a, const void* b, size_t size) { return a == b || (a && b && !std::memcmp(a, b, size)); }
 
@@ -79,7 +61,10 @@ bool Player::bind(BindPoint& point, const PipelineLayout& layout, const Bindings
                                                              set.element_count * sizeof(BoundResource));
         if (same_resources && same_offsets) continue;
         if (!same_resources || !layout.dynamic) {
-            const VkDescriptorSet written = writeSet(layout, set, bound, uniforms);
+            const LayoutElement& first = layout.elements[set.first_element];
+            const VkDescriptorSet written = first.table
+                                                ? tableSet(*set.layout, first, bound[set.first_element].resource)
+                                                : writeSet(layout, set, bound, uniforms);
             if (!written) {
                 point.bound = nullptr;
                 return false;
@@ -116,6 +101,14 @@ VkDescriptorSet Player::writeSet(const PipelineLayout& layout, const PipelineLay
     }
     vk_.UpdateDescriptorSetWithTemplate(device_.handle, written, set.layout->update, descriptors_.data());
     return written;
+}
+
+VkDescriptorSet Player::tableSet(const SetLayout& layout, const LayoutElement& element, uint32_t resource) {
+    const auto& contents = static_cast<const TableContents&>(*list_->resources[resource]);
+    Expected<VkDescriptorSet> set = static_cast<VulkanTable&>(*contents.native).set(layout, element, contents);
+    if (set) return *set;
+    fail(set.error());
+    return VK_NULL_HANDLE;
 }
 
 VkDescriptorBufferInfo Player::wholeBuffer(const BoundResource& bound) {

@@ -83,6 +83,24 @@ uint32_t textureSupport(const VulkanDevice& device, Format format, Texture::Type
     return support;
 }
 
+VkImageViewType viewType(ImageDimension dimension, const VulkanTexture& texture, Slice& slice) {
+    switch (dimension) {
+        case ImageDimension::Image2D:
+        case ImageDimension::Image2DMultisample: slice.layers = 1; return VK_IMAGE_VIEW_TYPE_2D;
+        case ImageDimension::Image3D: return VK_IMAGE_VIEW_TYPE_3D;
+        case ImageDimension::Cube: slice.layers = 6; return VK_IMAGE_VIEW_TYPE_CUBE;
+        case ImageDimension::Image2DArray: return VK_IMAGE_VIEW_TYPE_2D_ARRAY;
+        case ImageDimension::CubeArray: return VK_IMAGE_VIEW_TYPE_CUBE_ARRAY;
+        case ImageDimension::None: break;
+    }
+    switch (texture.desc().type) {
+        case Texture::Type3D: return VK_IMAGE_VIEW_TYPE_3D;
+        case Texture::TypeCube: return slice.layers == 6 ? VK_IMAGE_VIEW_TYPE_CUBE : VK_IMAGE_VIEW_TYPE_CUBE_ARRAY;
+        case Texture::Type2D: break;
+    }
+    return slice.layers == 1 ? VK_IMAGE_VIEW_TYPE_2D : VK_IMAGE_VIEW_TYPE_2D_ARRAY;
+}
+
 VulkanTexture::VulkanTexture(VulkanDevice& device, const TextureDesc& desc, uint32_t samples)
     : device_(device),
       desc_(desc),

@@ -14,6 +14,11 @@ class VulkanDevice;
 uint32_t textureSupport(const VulkanDevice& device, Format format, Texture::Type type);
 constexpr uint32_t supports_sampling = 1u << 31;
 
+class VulkanTexture;
+/// The view type of a descriptor, whose slice gets as many layers as it takes. Without a dimension (aliases of a table
+/// that differ) it follows the texture.
+VkImageViewType viewType(ImageDimension dimension, const VulkanTexture& texture, Slice& slice);
+
 class VulkanTexture final : public detail::NativeTexture {
 public:
     static Expected<std::unique_ptr<VulkanTexture>> create(VulkanDevice& device, const detail::NativeTextureDesc& desc);

@@ -51,6 +51,7 @@ struct NativeKernel : Native {};
 struct NativePipeline : Native {};
 struct NativeTraversal : Native {};
 struct NativeQuery : Native {};
+struct NativeTable : Native {};
 
 struct NativeTracing : Native {
     uint64_t memory = 0;      ///< bytes of the structure
@@ -319,6 +320,8 @@ public:
     virtual Expected<std::unique_ptr<NativeBuffer>> createBuffer(const NativeBufferDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeTexture>> createTexture(const NativeTextureDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeSampler>> createSampler(const SamplerDesc& desc) = 0;
+    /// For a TableContents, whose entries are set by the time it is played.
+    virtual Expected<std::unique_ptr<NativeTable>> createTable(const std::string& name) = 0;
     virtual Expected<std::unique_ptr<NativeKernel>> createKernel(const KernelDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativePipeline>> createPipeline(const PipelineDesc& desc) = 0;
     virtual Expected<std::unique_ptr<NativeTraversal>> createTraversal(const TraversalDesc& desc) = 0;

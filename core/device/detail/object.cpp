@@ -21,6 +21,9 @@ const char* toString(ObjectType type) {
         case ObjectType::Query: return "query";
         case ObjectType::Fence: return "fence";
         case ObjectType::Window: return "window";
+        case ObjectType::TextureTable: return "texture table";
+        case ObjectType::BufferTable: return "buffer table";
+        case ObjectType::Table: return "table";
     }
     return "object";
 }

@@ -36,6 +36,9 @@ enum class ObjectType : uint8_t {
     Query,
     Fence,
     Window,
+    TextureTable,
+    BufferTable,
+    Table,  ///< the contents of a table
 };
 const char* toString(ObjectType type);
 
@@ -249,6 +252,7 @@ private:
     Expected<Stages> specialize(std::vector<Ref<ShaderObject>> compiled, Where where) const;
     Error checkFeatures(const Reflection& stage, Where where) const;
     Error checkResource(const ShaderResource& resource, Where where) const;
+    Error checkTables(const BindingLayout& merged, Where where) const;
     Error checkSlots(const BindingLayout& merged, Where where) const;
 
     std::shared_ptr<Creation> creation_;  ///< of createAsync

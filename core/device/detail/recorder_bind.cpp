@@ -181,6 +181,17 @@ void RecorderCore::setTracing(const Slot& slot, const Tracing& tracing) {
     bound->value.resource = use(*object);
 }
 
+void RecorderCore::setTable(const Slot& slot, const Handle& table) {
+    Bound* bound = bind(SlotKind::Table, slot, 0);
+    if (!bound || !usable(table, "table", slot.where_)) return;
+    const uint32_t resource = use(*static_cast<TableObject*>(table.object())->see());
+    if (bound->set && bound->value.resource == resource) return;
+    bindings_dirty_ = true;
+    bound->set = true;
+    bound->value = {};
+    bound->value.resource = resource;
+}
+
 void RecorderCore::setPushData(const void* data, uint64_t size, Where where) {
     if (!recording(where)) return;
     const uint64_t limit = std::min<uint64_t>(push_data_.size(), device_->features().maxPushSize);
@@ -270,7 +281,54 @@ bool RecorderCore::checkBound(const ShaderResource& resource, SlotKind kind, uin
                                 tracing.built_offset, records);
             return true;
         }
+        case SlotKind::Table:
+            return checkTable(resource, static_cast<const TableContents&>(*list_.resources[value.resource]), slot, what,
+                              where);
         default: return true;
+    }
+}
+
+bool RecorderCore::checkTable(const ShaderResource& resource, const TableContents& table, uint32_t slot,
+                              const char* what, Where where) {
+    const auto complain = [&](const char* id, const std::string& text) {
+        fail(where, ErrorCode::InvalidArgument, id, "{}: table {} '{}' of {} {}", what, slot, resource.name,
+             program_->label(), text);
+        return false;
+    };
+    if (table.element != resource.element)
+        return complain("bind.table", fmt::format("holds {} entries, {} holds {} ones", toString(resource.element),
+                                                  table.label(), toString(table.element)));
+    for (size_t i = 0; i < table.entries.size(); i++) {
+        const TableContents::Entry& entry = table.entries[i];
+        if (!entry.object) continue;
+        const bool is_texture = table.element == SlotKind::Texture;
+        // Aliases of several dimensions: each shader knows which entries are of its own.
+        if (is_texture && resource.dimension != ImageDimension::None &&
+            !checkTexture(resource, static_cast<const TextureObject&>(*entry.object), entry.slice))
+            return complain("bind.texture_type",
+                            fmt::format("holds {} images; entry {} of {}, {} with {} layers, is none",
+                                        dimensionName(resource.dimension), i, table.label(), entry.object->label(),
+                                        entry.slice.layers));
+        if (!is_texture && entry.size < resource.size)
+            return complain("bind.storage_size",
+                            fmt::format("needs at least {} bytes; entry {} of {}, {}, gives {}", resource.size, i,
+                                        table.label(), entry.object->label(), entry.size));
+    }
+    return true;
+}
+
+void RecorderCore::accessTable(const ShaderResource& resource, const TableContents& table) {
+    const bool is_texture = table.element == SlotKind::Texture;
+    const auto flags = static_cast<uint8_t>((resource.read ? AccessRead : 0) | (resource.write ? AccessWrite : 0));
+    for (const TableContents::Entry& entry : table.entries) {
+        if (!entry.object) continue;
+        const uint32_t index = use(*entry.object);
+        forEachStage(resource.stages, [&](Stage stage) {
+            if (is_texture)
+                access(index, stage, AccessRead, Layout::Sampled, entry.slice);
+            else
+                access(index, stage, flags ? flags : static_cast<uint8_t>(AccessRead));
+        });
     }
 }
 
@@ -281,6 +339,8 @@ TracingObject& RecorderCore::tracedObject(const ShaderResource& resource, const 
 
 void RecorderCore::accessBound(const ShaderResource& resource, SlotKind kind, const Bound& bound) {
     if (kind == SlotKind::Sampler || bound.inlined) return;
+    if (kind == SlotKind::Table)
+        return accessTable(resource, static_cast<const TableContents&>(*list_.resources[bound.value.resource]));
     const uint32_t index = kind == SlotKind::Tracing ? use(tracedObject(resource, bound)) : bound.value.resource;
     const auto flags = static_cast<uint8_t>((resource.read ? AccessRead : 0) | (resource.write ? AccessWrite : 0));
     forEachStage(resource.stages, [&](Stage stage) {
@@ -332,8 +392,9 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
             if (slot >= slots.size()) slots.resize(layout.slots[k].size());
             const bool in_software = resource.isRewritten();
             if (kind == SlotKind::Tracing && !bindings_dirty_ && !in_software) continue;
-            for (uint32_t e = 0; e < resource.count; e++) {
-                Bound& bound = resource.count == 1               ? slots[slot]
+            const uint32_t count = kind == SlotKind::Table ? 1 : resource.count;
+            for (uint32_t e = 0; e < count; e++) {
+                Bound& bound = count == 1                        ? slots[slot]
                                : e < slots[slot].elements.size() ? slots[slot].elements[e]
                                                                  : unset;
                 if (bindings_dirty_ && !checkBound(resource, kind, slot, bound, what, where)) return false;
@@ -378,14 +439,15 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
             });
         shared_count_ = static_cast<uint32_t>(list_.accesses.size()) - first_shared_;
         const std::span shared(list_.accesses.data() + first_shared_, shared_count_);
-        for (size_t i = 0; i < shared.size(); i++) {
-            if (shared[i].layout == Layout::None) continue;
-            for (size_t j = 0; j < i; j++)
-                if (shared[j].resource == shared[i].resource && shared[j].layout != shared[i].layout &&
-                    overlap(shared[i].slice, shared[j].slice)) {
+        // Surfaces are few, the textures of a table many.
+        for (const Access& surface : shared) {
+            if (surface.layout != Layout::General) continue;
+            for (const Access& texture : shared)
+                if (texture.layout == Layout::Sampled && texture.resource == surface.resource &&
+                    overlap(texture.slice, surface.slice)) {
                     fail(where, ErrorCode::InvalidArgument, "bind.layout_conflict",
                          "{}: {} is bound both as texture and as surface", what,
-                         list_.resources[shared[i].resource]->label());
+                         list_.resources[surface.resource]->label());
                     return false;
                 }
         }

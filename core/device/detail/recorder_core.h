@@ -8,6 +8,7 @@
 #include <glint/device/detail/command_list.h>
 #include <glint/device/detail/device_object.h>
 #include <glint/device/detail/pending_builds.h>
+#include <glint/device/detail/table_object.h>
 #include <glint/device/detail/target_object.h>
 
 #include <array>
@@ -55,6 +56,7 @@ public:
     void setTexture(SlotKind kind, const Slot& slot, uint32_t step, const Texture& texture, Slice slice);
     void setSampler(const Slot& slot, uint32_t step, const Sampler& sampler);
     void setTracing(const Slot& slot, const Tracing& tracing);
+    void setTable(const Slot& slot, const Handle& table);
     void setPushData(const void* data, uint64_t size, Where where);
     void useBuffer(const Buffer& buffer, bool write, Where where);
     void clearUses();
@@ -245,6 +247,9 @@ private:
     bool flushBindings(const char* what, Where where);
     bool checkBound(const ShaderResource& resource, SlotKind kind, uint32_t slot, Bound& bound, const char* what,
                     Where where);
+    bool checkTable(const ShaderResource& resource, const TableContents& table, uint32_t slot, const char* what,
+                    Where where);
+    void accessTable(const ShaderResource& resource, const TableContents& table);
     /// What a program's slot of structures reads: the driver's in ray-tracing pipelines.
     TracingObject& tracedObject(const ShaderResource& resource, const Bound& bound) const;
     void accessBound(const ShaderResource& resource, SlotKind kind, const Bound& bound);

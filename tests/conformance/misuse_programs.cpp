@@ -114,7 +114,7 @@ MISUSE(MaskWithoutTheStage, "program.mask") {
     return shaded(kit, "layout(binding = 0) uniform A { vec4 a; };\nvoid main() { gl_Position = a; }", red_fragment,
                   [](Pipeline& pipeline) { pipeline.setUniformMask(0, Shader::MaskFragment); });
 }
-MISUSE(TableOfTextures, "program.table") {
+MISUSE(TableBesideOthers, "program.table") {
     return kit.program(R"(
         #extension GL_EXT_nonuniform_qualifier : require
         layout(local_size_x = 1) in;
@@ -122,6 +122,55 @@ MISUSE(TableOfTextures, "program.table") {
         layout(binding = 1) uniform sampler nearest;
         layout(binding = 2) buffer Values { vec4 value; uint index; };
         void main() { value = texelFetch(sampler2D(pictures[nonuniformEXT(index)], nearest), ivec2(0), 0); })");
+}
+MISUSE(TableOfCombinedTextures, "program.table") {
+    return kit.program(R"(
+        layout(local_size_x = 1) in;
+        layout(set = 1, binding = 0) uniform sampler2D pictures[];
+        layout(binding = 2) buffer Values { vec4 value; uint index; };
+        void main() { value = texelFetch(pictures[index], ivec2(0), 0); })");
+}
+MISUSE(TableOfSurfaces, "program.table") {
+    return kit.program(R"(
+        layout(local_size_x = 1) in;
+        layout(set = 1, binding = 0, rgba8) uniform image2D pictures[];
+        layout(binding = 2) buffer Values { vec4 value; uint index; };
+        void main() { value = imageLoad(pictures[index], ivec2(0)); })");
+}
+MISUSE(TableOfUniforms, "program.table") {
+    return kit.program(R"(
+        layout(local_size_x = 1) in;
+        layout(set = 1, binding = 0) uniform Part { vec4 value; } parts[];
+        layout(binding = 2) buffer Values { vec4 value; uint index; };
+        void main() { value = parts[index].value; })");
+}
+MISUSE(TablesOfManySets, "program.table") {
+    return kit.program(R"(
+        layout(local_size_x = 1) in;
+        layout(set = 0, binding = 0) uniform texture2D a[];
+        layout(set = 1, binding = 0) uniform texture2D b[];
+        layout(set = 2, binding = 0) uniform texture2D c[];
+        layout(set = 3, binding = 0) uniform texture2D d[];
+        layout(set = 4, binding = 0) uniform texture2D e[];
+        void main() {})");
+}
+MISUSE(TwoTablesInOneSet, "program.table") {
+    return kit.program(R"(
+        layout(local_size_x = 1) in;
+        layout(set = 0, binding = 0) uniform texture2D a[];
+        layout(set = 0, binding = 1) uniform texture2D b[];
+        void main() {})");
+}
+MISUSE(TableShaderWithoutFeature, "program.feature") {
+    Kernel kernel = kit.bare.createKernel();
+    kernel.createShaderGLSL("layout(local_size_x = 1) in; layout(binding = 0) uniform texture2D a[]; void main() {}");
+    return kernel.create().error();
+}
+MISUSE(BufferTableShaderWithoutFeature, "program.feature") {
+    Kernel kernel = kit.bare.createKernel();
+    kernel.createShaderGLSL(
+        "layout(local_size_x = 1) in; layout(binding = 0) buffer A { float value; } a[]; void main() {}");
+    return kernel.create().error();
 }
 MISUSE(ArrayOfManyBuffers, "program.array") {
     return kit.program(R"(

@@ -119,6 +119,34 @@ layout(binding = 6, rgba8) uniform image2D surface;
 layout(location = 0) out vec4 color;
 void main() { color = imageLoad(surface, ivec2(0)); imageStore(surface, ivec2(1), color); })";
 
+inline constexpr const char* table_kernel = R"(
+layout(local_size_x = 8) in;
+layout(set = 1, binding = 0) uniform texture2DArray images[];
+layout(set = 2, binding = 0) buffer Part { uint values[]; } parts[];
+void main() {
+    uint i = gl_GlobalInvocationID.x % 3u;
+    parts[nonuniformEXT(i)].values[i] += uint(texelFetch(images[nonuniformEXT(i)], ivec3(0), 0).x);
+})";
+
+// The task stage writes what the mesh stage reads: one block in both.
+inline constexpr const char* counting_task = R"(
+layout(local_size_x = 1) in;
+layout(binding = 5) buffer Count { uint count; };
+void main() {
+    atomicAdd(count, 1u);
+    EmitMeshTasksEXT(1, 1, 1);
+})";
+
+inline constexpr const char* reading_mesh = R"(
+layout(local_size_x = 1) in;
+layout(triangles, max_vertices = 3, max_primitives = 1) out;
+layout(binding = 0) readonly buffer Positions { vec4 positions[]; };
+layout(binding = 5) buffer Count { uint count; };
+void main() {
+    SetMeshOutputsEXT(3, 1);
+    gl_MeshVerticesEXT[0].gl_Position = positions[count];
+})";
+
 inline constexpr const char* plain_fragment = R"(
 layout(location = 0) out vec4 color;
 void main() { color = vec4(1.0); })";
@@ -150,6 +178,7 @@ struct Programs {
         gather = kernel(gather_kernel);
         address = kernel(address_kernel);
         trace = kernel(trace_kernel);
+        tables = kernel(table_kernel);
         rays = device.createTraversal();
         rays.createShaderGLSL(Shader::TypeRayGen, trace_generation);
         rays.createShaderGLSL(Shader::TypeClosest, reading_closest);
@@ -161,11 +190,14 @@ struct Programs {
             {reading_vertex, sampling_fragment},  {reading_vertex, storing_fragment},
             {writing_vertex, reading_fragment},   {counting_vertex, counting_fragment},
             {painting_vertex, painting_fragment}, {painting_vertex, sampling_fragment},
+            {reading_mesh, plain_fragment},       {reading_mesh, sampling_fragment},
         };
         for (const auto& [vertex, fragment] : stages) {
+            const bool is_mesh = vertex == reading_mesh;
             for (const bool depth : {false, true}) {
                 Pipeline pipeline = device.createPipeline();
-                pipeline.createShaderGLSL(Shader::TypeVertex, vertex);
+                if (is_mesh) pipeline.createShaderGLSL(Shader::TypeTask, counting_task);
+                pipeline.createShaderGLSL(is_mesh ? Shader::TypeMesh : Shader::TypeVertex, vertex);
                 pipeline.createShaderGLSL(Shader::TypeFragment, fragment);
                 pipeline.setColorFormat(FormatRGBAu8n);
                 if (depth) {
@@ -176,7 +208,8 @@ struct Programs {
                 if (fetches) pipeline.addAttribute(Pipeline::AttributePosition, FormatRGBAf32, 0, 0, 16);
                 EXPECT_THAT(pipeline.create(), IsOk());
                 draws.push_back({pipeline, pipeline.getSlots(SlotKind::Storage), fetches,
-                                 pipeline.getSlots(SlotKind::Texture) > 0, pipeline.getSlots(SlotKind::Surface) > 0});
+                                 pipeline.getSlots(SlotKind::Texture) > 0, pipeline.getSlots(SlotKind::Surface) > 0,
+                                 is_mesh});
             }
         }
     }
@@ -184,9 +217,9 @@ struct Programs {
     struct DrawProgram {
         Pipeline pipeline;
         uint32_t storages;
-        bool fetches, samples, paints;
+        bool fetches, samples, paints, is_mesh;
     };
-    Kernel copy, change, sample, store, paint, gather, address, trace;
+    Kernel copy, change, sample, store, paint, gather, address, trace, tables;
     Traversal rays;
     Sampler sampler;
     std::vector<DrawProgram> draws;  ///< each without and with depth
@@ -216,6 +249,8 @@ public:
         textures_[1] = device.createTexture(desc, "picture");
         depth_ = device.createTexture2D(FormatDf32, 8, 8, Texture::FlagTarget, "depth");
         fine_ = device.createTexture2D(FormatRGBAu8n, 8, 8, Texture::FlagTarget | Texture::FlagMultisample4, "fine");
+        images_ = device.createTextureTable(3, "images");
+        parts_ = device.createBufferTable(3, "parts");
         time_ = device.createQuery(Query::TypeTime, "time");
         vertices_ = device.createBuffer(Buffer::FlagTracing | Buffer::FlagStorage, 36 * 4, "vertices");
         for (size_t i = 0; i < bottoms_.size(); i++) {
@@ -380,7 +415,7 @@ private:
     }
 
     void dispatch(Compute& list) {
-        switch (below(9)) {
+        switch (below(10)) {
             case 0:
                 list.setKernel(programs_.gather);
                 list.setUniformBuffer(0, buffer(), 256 * below(3), 64);
@@ -430,6 +465,15 @@ private:
                 list.setStorageBuffer(0, buffer());
                 list.setStorageBuffer(1, buffer());
                 break;
+            case 8: {
+                const Texture& image = texture();
+                images_.set(static_cast<uint32_t>(below(3)), below(4) ? image : Texture(), range(image));
+                parts_.set(static_cast<uint32_t>(below(3)), below(4) ? buffer() : Buffer(), 512 * below(2));
+                list.setKernel(programs_.tables);
+                list.setTextureTable(0, images_);
+                list.setBufferTable(1, parts_);
+                break;
+            }
             default:
                 list.setKernel(programs_.trace);
                 list.setTracing(0, top_);
@@ -518,7 +562,16 @@ private:
             }
             if (program.samples && !bindImage(list, color, slice, has_depth, program.paints ? &surface : nullptr))
                 continue;
-            switch (below(4)) {
+            if (program.is_mesh) {
+                switch (below(3)) {
+                    case 0: list.drawMeshIndirect(buffer(), 16 * below(4)); break;
+                    case 1: list.drawMeshIndirect(buffer(), 0, buffer(), 4 * below(4), 8); break;
+                    default: list.drawMesh(3); break;
+                }
+                continue;
+            }
+            switch (below(5)) {
+                case 4: list.drawArraysIndirect(buffer(), 0, buffer(), 64, 4); break;
                 case 0:
                     list.setIndexBuffer(FormatRu16, buffer());
                     list.drawElements(6);
@@ -536,6 +589,8 @@ private:
     std::array<Buffer, 4> buffers_;
     std::array<Texture, 2> textures_;
     Texture depth_, fine_;
+    TextureTable images_;
+    BufferTable parts_;
     Query time_;
     Buffer vertices_;
     std::array<Tracing, 4> bottoms_;

@@ -17,6 +17,7 @@ find_package(CLI11 CONFIG REQUIRED)
 find_package(PNG REQUIRED)
 find_package(tinyobjloader CONFIG REQUIRED)
 find_package(TinyGLTF CONFIG REQUIRED)
+find_package(meshoptimizer CONFIG REQUIRED)
 set(CMAKE_MESSAGE_LOG_LEVEL WARNING)  # Debian's Imath remarks at length that its Python module is not installed
 find_package(OpenEXR CONFIG REQUIRED)
 unset(CMAKE_MESSAGE_LOG_LEVEL)

@@ -31,9 +31,15 @@ struct Piece {
 };
 
 /// Cuts a piece by the plane through `point`: `inside` gets what lies in direction `inward`. A cut adds a corner.
-void cut(const Piece& piece, const Vector3d& point, const Vector3d& inward, Piece& inside, Piece& outside) {
+/// Corners within `width` of the plane lie on it, or a piece would be cut for ever where it has been cut before.
+void cut(const Piece& piece, const Vector3d& point, const Vector3d& inward, double width, Piece& inside,
+         Piece& outside) {
     std::array<double, Piece::most> side;
-    for (uint32_t i = 0; i < piece.count; i++) side[i] = glm::dot(piece.corners[i] - point, inward);
+    const double length = glm::length(inward);
+    for (uint32_t i = 0; i < piece.count; i++) {
+        side[i] = length > 0.0 ? glm::dot(piece.corners[i] - point, inward) / length : 0.0;
+        if (std::abs(side[i]) <= width) side[i] = 0.0;
+    }
     inside.count = outside.count = 0;
     for (uint32_t i = 0; i < piece.count; i++) {
         const uint32_t next = i + 1 < piece.count ? i + 1 : 0;
@@ -69,7 +75,7 @@ public:
             }
             guesses[i] = guess;
         }
-        budget_ = (1u << 16) + 8 * from_.size();
+        budget_ = (1u << 16) + uint64_t{16} * (uint64_t{from_.size()} + to_.size());
         for (uint32_t i = 0; i < from_.size(); i++) {
             if (isSettled(uppers[i])) continue;
             Piece piece;
@@ -137,7 +143,7 @@ private:
         Piece rest = piece, inside, outside;
         bool has_cut = false;
         for (int k = 0; k < 3 && rest.count > 2; k++) {
-            cut(rest, other[k], glm::cross(normal, other[(k + 1) % 3] - other[k]), inside, outside);
+            cut(rest, other[k], glm::cross(normal, other[(k + 1) % 3] - other[k]), floor_ * 0x1p-10, inside, outside);
             if (outside.count < 3 || inside.count < 3) continue;
             has_cut = true;
             push(outside, bound, triangle);
@@ -166,7 +172,7 @@ private:
                     to = piece.corners[j];
                 }
         Piece inside, outside;
-        cut(piece, (from + to) * 0.5, to - from, inside, outside);
+        cut(piece, (from + to) * 0.5, to - from, 0.0, inside, outside);
         for (Piece* part : {&inside, &outside})
             if (part->count > 0) push(*part, farthest(part->corners.data(), part->count, guess).second, guess);
     }

@@ -19,8 +19,9 @@ struct SurfaceDistance {
 /// The upper bound holds for every point, not for samples: the distance to one triangle is a convex function, so on a
 /// convex polygon it is largest at a corner. A triangle of one surface is cut along the borders of the nearest
 /// triangles of the other until that bound is at most `tolerance` above the distance of a point that was found (or
-/// below 2^-20 of the size of the surfaces); where 2^16 pieces and 8 for each triangle do not suffice, the bound that
-/// the last pieces have stands. Rounding is part of it: float64 throughout, and 2^-40 of the largest coordinate on top.
+/// below 2^-20 of the size of the surfaces); where 2^16 pieces and 16 for each triangle do not suffice, the bound
+/// that the last pieces have stands. Rounding is part of it: float64 throughout, and 2^-40 of the largest coordinate on
+/// top.
 ///
 /// Infinite if only one of the two has triangles. Indices have to be in range and positions finite.
 SurfaceDistance hausdorffDistance(std::span<const Vector3f> positions_a, std::span<const uint32_t> indices_a,

@@ -211,6 +211,11 @@ Status MeshGraph::checkClusters() const {
 
 Status MeshGraph::checkGroups() const {
     const std::span<const MeshCluster> all = clusters();
+    for (size_t i = 0; i < groups().size(); i++)
+        if (!areFinite(std::as_bytes(groups().subspan(i, 1)).first(offsetof(MeshClusterGroup, level))) ||
+            !(groups()[i].error >= 0.0f))
+            return graphError("graph.not_finite",
+                              fmt::format("group {}: a bound or the error is NaN, negative, or 2^63 or larger", i));
     uint64_t child = root_count_, parent = 0;
     for (size_t i = 0; i < groups().size(); i++) {
         const MeshClusterGroup& group = groups()[i];
@@ -227,9 +232,6 @@ Status MeshGraph::checkGroups() const {
         parent += group.parent_count;
         if (child > all.size() || parent > parents().size())
             return fail("graph.group", "ends past the clusters or the parents");
-        if (!areFinite(std::as_bytes(std::span(&group, 1)).first(offsetof(MeshClusterGroup, level))) ||
-            !(group.error >= 0.0f))
-            return fail("graph.not_finite", "a bound or the error is NaN, negative, or 2^63 or larger");
         for (const uint32_t cluster : parents().subspan(group.first_parent, group.parent_count))
             if (cluster >= all.size() || all[cluster].source != i)
                 return fail("graph.group", fmt::format("its parent {} has another source", cluster));

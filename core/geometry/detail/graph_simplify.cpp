@@ -12,6 +12,11 @@ namespace glint::detail {
 
 namespace {
 
+EdgeKey keyOf(uint32_t a, uint32_t b) {
+    const auto [low, high] = std::minmax(a, b);
+    return EdgeKey{low} << 32 | high;
+}
+
 /// How often an edge is run along, from the lower place to the higher one and back.
 struct EdgeCount {
     EdgeKey key;
@@ -65,32 +70,53 @@ std::vector<uint32_t> placesOf(const GraphMesh& mesh, std::span<const uint32_t> 
     return places;
 }
 
-/// meshoptimizer's simplification to half of the triangles, degenerate results left out.
-std::vector<uint32_t> simplify(const GraphMesh& mesh, std::span<const uint32_t> indices,
-                               const std::vector<EdgeCount>& edges, const ClusterGroup& group) {
-    // The library locks what lies on an edge of one triangle. A place that others share and that lies on none, such as
-    // the tip where two cones touch, gets such edges by a triangle that is withheld.
-    std::vector<uint32_t> bordering;
+/// Divides triangles into such as the library may see and others, so that it changes nothing that it should not. It
+/// locks what lies on an edge of one triangle, and takes edges of several triangles, or of repeated ones, for ordinary
+/// ones. So these triangles are withheld, and then one at each place that has to stay and lies on no edge of one
+/// triangle.
+void withhold(const GraphMesh& mesh, std::span<const uint32_t> indices, const std::vector<EdgeCount>& edges,
+              const ClusterGroup& group, std::vector<uint32_t>& given, std::vector<uint32_t>& withheld) {
+    std::vector<EdgeKey> irregular;
     for (const EdgeCount& edge : edges)
+        if (edge.forward > 1 || edge.backward > 1) irregular.push_back(edge.key);
+    std::vector<uint32_t> regular;
+    for (size_t i = 0; i < indices.size(); i += 3) {
+        const uint32_t a = mesh.places[indices[i]], b = mesh.places[indices[i + 1]], c = mesh.places[indices[i + 2]];
+        bool is_irregular = false;
+        if (!irregular.empty())
+            for (const EdgeKey key : {keyOf(a, b), keyOf(b, c), keyOf(c, a)})
+                is_irregular = is_irregular || std::binary_search(irregular.begin(), irregular.end(), key);
+        for (size_t k = 0; k < 3; k++) (is_irregular ? withheld : regular).push_back(indices[i + k]);
+    }
+    std::vector<uint32_t> staying = placesOf(mesh, withheld), bordering;
+    staying.insert(staying.end(), group.locked_places.begin(), group.locked_places.end());
+    std::sort(staying.begin(), staying.end());
+    staying.erase(std::unique(staying.begin(), staying.end()), staying.end());
+    for (const EdgeCount& edge : withheld.empty() ? edges : countEdges(mesh, regular))
         if (edge.forward == 0 || edge.backward == 0) {
             bordering.push_back(static_cast<uint32_t>(edge.key >> 32));
             bordering.push_back(static_cast<uint32_t>(edge.key));
         }
     std::sort(bordering.begin(), bordering.end());
-    std::vector<uint32_t> open;
-    std::set_difference(group.locked_places.begin(), group.locked_places.end(), bordering.begin(), bordering.end(),
-                        std::back_inserter(open));
-    std::vector<uint32_t> given, result;
-    for (size_t i = 0; i < indices.size(); i += 3) {
-        bool withheld = false;
-        for (size_t k = 0; k < 3 && !open.empty(); k++) {
-            const auto found = std::lower_bound(open.begin(), open.end(), mesh.places[indices[i + k]]);
-            if (found == open.end() || *found != mesh.places[indices[i + k]]) continue;
-            withheld = true;
-            open.erase(found);
+    std::vector<uint32_t> free;
+    std::set_difference(staying.begin(), staying.end(), bordering.begin(), bordering.end(), std::back_inserter(free));
+    for (size_t i = 0; i < regular.size(); i += 3) {
+        bool holds = false;
+        for (size_t k = 0; k < 3 && !free.empty(); k++) {
+            const auto found = std::lower_bound(free.begin(), free.end(), mesh.places[regular[i + k]]);
+            if (found == free.end() || *found != mesh.places[regular[i + k]]) continue;
+            holds = true;
+            free.erase(found);
         }
-        for (size_t k = 0; k < 3; k++) (withheld ? result : given).push_back(indices[i + k]);
+        for (size_t k = 0; k < 3; k++) (holds ? withheld : given).push_back(regular[i + k]);
     }
+}
+
+/// meshoptimizer's simplification to half of the triangles, degenerate results left out.
+std::vector<uint32_t> simplify(const GraphMesh& mesh, std::span<const uint32_t> indices,
+                               const std::vector<EdgeCount>& edges, const ClusterGroup& group) {
+    std::vector<uint32_t> given, result;
+    withhold(mesh, indices, edges, group, given, result);
     if (given.empty()) return result;
 
     std::vector<uint32_t> vertices(given);

@@ -61,10 +61,10 @@ Expected<SimplifiedMesh> simplify(const Mesh& mesh, const SimplifyOptions& optio
         if (tried.mesh.indices.size() < best.mesh.indices.size()) best = std::move(tried);
         return true;
     };
-    // The library's own error bounds nothing, so the ratio is searched for: bisection of its logarithm, to a percent.
+    // The library's own error bounds nothing, so the ratio is searched for: bisection of its logarithm, to a fiftieth.
     if (!attempt(options.ratio)) {
         double low = std::max(options.ratio, 3.0 / static_cast<double>(mesh.indices.size())), high = 1.0;
-        while (high / low > 1.01) {
+        while (high / low > 1.02) {
             const double middle = std::sqrt(low * high);
             (attempt(middle) ? high : low) = middle;
         }

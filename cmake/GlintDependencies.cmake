@@ -18,6 +18,18 @@ find_package(PNG REQUIRED)
 find_package(tinyobjloader CONFIG REQUIRED)
 find_package(TinyGLTF CONFIG REQUIRED)
 find_package(meshoptimizer CONFIG REQUIRED)
+# Compiled against, and opened when it is needed: see core/format/assimp.cpp.
+find_package(assimp CONFIG REQUIRED)
+add_library(glint_assimp INTERFACE)
+get_target_property(include assimp::assimp INTERFACE_INCLUDE_DIRECTORIES)
+if(include)
+    target_include_directories(glint_assimp SYSTEM INTERFACE ${include})
+endif()
+string(REGEX MATCH "^[0-9]+\\.[0-9]+" version "${assimp_VERSION}")
+string(REGEX MATCH "^[0-9]+" soname "${assimp_VERSION}")
+target_compile_definitions(glint_assimp INTERFACE
+    "GLINT_ASSIMP_VERSION=\"${version}\"" "GLINT_ASSIMP_SONAME=\"libassimp.so.${soname}\"")
+target_link_libraries(glint_assimp INTERFACE ${CMAKE_DL_LIBS})
 set(CMAKE_MESSAGE_LOG_LEVEL WARNING)  # Debian's Imath remarks at length that its Python module is not installed
 find_package(OpenEXR CONFIG REQUIRED)
 unset(CMAKE_MESSAGE_LOG_LEVEL)

@@ -40,6 +40,11 @@ struct Mesh {
     /// ".glb": the scene at rest, see Scene::mesh). Degenerate and repeated triangles are kept, and triangles keep the
     /// order of the file. Errors: those of readFile, "mesh.unknown_extension" and those of the format; they name the
     /// file and the line or the element.
+    ///
+    /// What docs/formats.md lists besides is read by assimp, if its library is installed: at rest, polygons split into
+    /// triangles, equal vertices joined, a part for each of the file's meshes. That library does not withstand files that
+    /// were made to harm. Errors: "mesh.library" (not installed, or of another version), "mesh.assimp" (it cannot read
+    /// the file).
     static Expected<Mesh> load(const std::filesystem::path& path, uint64_t limit = default_limit);
 
     /// Writes a file, as its ending says (".ply", see encodePly). Errors: those of writeFile, "mesh.unknown_extension"

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
+#include <thread>
 
 namespace glint {
 
@@ -30,10 +32,10 @@ struct BuiltGroup {
 class Builder {
 public:
     Builder(const Mesh& mesh, const MeshGraphOptions& options)
-        : mesh_(mesh),
-          options_(options),
-          places_{mesh.positions, detail::firstWithPosition(mesh.positions)},
-          pool_(options.threads) {}
+        : mesh_(mesh), options_(options), places_{mesh.positions, detail::firstWithPosition(mesh.positions)} {
+        const uint32_t threads = options.threads > 0 ? options.threads : std::thread::hardware_concurrency();
+        if (threads > 1) pool_.emplace(threads - 1);
+    }
 
     Expected<MeshGraph> build() {
         makeLeaves();
@@ -63,6 +65,7 @@ private:
         pending_.resize(clusters_.size());
         std::iota(pending_.begin(), pending_.end(), 0u);
         for (const BuiltCluster& cluster : clusters_) work_ += cluster.indices.size();
+        left_ = work_;
     }
 
     void addPart(const MeshPart& part) {
@@ -97,14 +100,22 @@ private:
             detail::makeGroups(places_, clusters_, pending_, options_.group_clusters);
         std::vector<SimplifiedGroup> results(planned.size());
         std::atomic<size_t> next = 0;
+        std::atomic<uint64_t> done = 0;
         std::atomic<bool> is_cancelled = false;
-        for (uint32_t i = 0; i < pool_.size(); i++)
-            pool_.submit([&] {
-                for (size_t group = next++; group < planned.size() && !is_cancelled; group = next++)
-                    if (planned[group].clusters.size() > 1)
-                        results[group] = detail::simplifyGroup(places_, clusters_, planned[group]);
-            });
-        pool_.wait();
+        // All threads take groups; this one tells how far they are.
+        const auto work = [&](bool tells) {
+            for (size_t group = next++; group < planned.size() && !is_cancelled; group = next++) {
+                if (planned[group].clusters.size() > 1)
+                    results[group] = detail::simplifyGroup(places_, clusters_, planned[group]);
+                for (const uint32_t cluster : planned[group].clusters) done += clusters_[cluster].indices.size();
+                if (tells && !tell(done)) is_cancelled = true;
+            }
+        };
+        if (pool_)
+            for (uint32_t i = 0; i < pool_->size(); i++) pool_->submit([&] { work(false); });
+        work(true);
+        if (pool_) pool_->wait();
+        if (is_cancelled) return false;
 
         std::vector<uint32_t> pending;
         for (size_t i = 0; i < planned.size(); i++) {
@@ -116,11 +127,17 @@ private:
         }
         dropFinished(pending);
         pending_ = std::move(pending);
+        left_ = 0;
+        for (const uint32_t cluster : pending_) left_ += clusters_[cluster].indices.size();
+        return tell(0);
+    }
+
+    /// With `done` indices of this level seen to, each of which leaves half of one.
+    bool tell(uint64_t done) {
         if (!options_.progress) return true;
-        uint64_t left = 0;
-        for (const uint32_t cluster : pending_) left += clusters_[cluster].indices.size();
-        // Each level halves what is left.
-        return options_.progress(1.0f - static_cast<float>(left) / static_cast<float>(work_));
+        told_ =
+            std::max(told_, 1.0f - static_cast<float>(left_ - std::min(done, left_) / 2) / static_cast<float>(work_));
+        return options_.progress(told_);
     }
 
     /// Clusters that could not be simplified may be in other company.
@@ -253,12 +270,14 @@ private:
     const Mesh& mesh_;
     const MeshGraphOptions& options_;
     const detail::GraphMesh places_;
-    ThreadPool pool_;
+    std::optional<ThreadPool> pool_;  ///< beside the calling thread
     std::vector<MeshGraphPart> parts_;
     std::vector<BuiltCluster> clusters_;
     std::vector<BuiltGroup> groups_;
     std::vector<uint32_t> pending_;
-    uint64_t work_ = 0;
+    uint64_t work_ = 0;  ///< indices at the beginning
+    uint64_t left_ = 0;  ///< indices pending
+    float told_ = 0.0f;
 };
 
 }  // namespace

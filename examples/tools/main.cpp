@@ -74,12 +74,13 @@ int failUsage(const char* command, const std::string& text) {
 }  // namespace tool
 
 int main(int argc, char** argv) {
-    CLI::App app("Looks at adapters, compiles and converts shaders, casts rays at meshes, handles Gaussian splats.",
-                 "glint");
+    CLI::App app(
+        "Looks at adapters, compiles and converts shaders, casts rays at meshes, handles Gaussian splats and meshes.",
+        "glint");
     app.set_help_flag("-h,--help", "Print this and end");
     app.require_subcommand(1);
     const std::array commands = {tool::infoCommand(app), tool::shaderCommand(app), tool::castCommand(app),
-                                 tool::splatCommand(app)};
+                                 tool::splatCommand(app), tool::meshCommand(app)};
     try {
         app.parse(argc, argv);
     } catch (const CLI::CallForHelp&) {

@@ -31,10 +31,15 @@ Command infoCommand(CLI::App& app);
 Command shaderCommand(CLI::App& app);
 Command castCommand(CLI::App& app);
 Command splatCommand(CLI::App& app);
+Command meshCommand(CLI::App& app);
 
 // Subcommands of `glint splat` that have a source of their own.
 Command splatRenderCommand(CLI::App& app);
 Command splatFromMeshCommand(CLI::App& app);
+
+// Subcommands of `glint mesh` that have a source of their own.
+Command meshInfoCommand(CLI::App& app);
+Command meshLodCommand(CLI::App& app);
 
 /// Adds --adapter and --api: where to compute.
 void addDevice(CLI::App& app, std::string& adapter, std::string& api);

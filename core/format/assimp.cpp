@@ -1,8 +1,9 @@
 // Formats that have no smaller library. assimp is opened when the first such file is read: linking it would make every
-// program load 10 MB of library and its dependencies. Its C interface lets no exception out.
+// program load 10 MB of library and its dependencies.
 
 #include <glint/format/detail/assimp.h>
 
+#include <glint/base/file.h>
 #include <glint/base/format_error.h>
 
 #include <assimp/cimport.h>
@@ -12,10 +13,19 @@
 #include <assimp/version.h>
 
 #include <dlfcn.h>
+#include <fcntl.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <cmath>
-#include <memory>
-#include <mutex>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <span>
 
 namespace glint::detail {
 
@@ -24,10 +34,8 @@ namespace {
 /// The functions of the library that are used.
 struct Library {
     decltype(&aiImportFileExWithProperties) import = nullptr;
-    decltype(&aiReleaseImport) release = nullptr;
     decltype(&aiGetErrorString) error = nullptr;
     decltype(&aiCreatePropertyStore) createProperties = nullptr;
-    decltype(&aiReleasePropertyStore) releaseProperties = nullptr;
     decltype(&aiSetImportPropertyInteger) setInteger = nullptr;
     std::string reason;  ///< why it cannot be used; empty if it can
 };
@@ -49,10 +57,8 @@ Library openLibrary() {
     find(major, "aiGetVersionMajor");
     find(minor, "aiGetVersionMinor");
     find(library.import, "aiImportFileExWithProperties");
-    find(library.release, "aiReleaseImport");
     find(library.error, "aiGetErrorString");
     find(library.createProperties, "aiCreatePropertyStore");
-    find(library.releaseProperties, "aiReleasePropertyStore");
     find(library.setInteger, "aiSetImportPropertyInteger");
     // Structures differ from version to version.
     const std::string version = is_complete ? fmt::format("{}.{}", major(), minor()) : "";
@@ -106,45 +112,186 @@ Expected<Mesh> collect(const aiScene& scene, uint64_t limit) {
         part.index_count = static_cast<uint32_t>(mesh.indices.size()) - part.first_index;
         if (part.index_count > 0) mesh.parts.push_back(std::move(part));
     }
-    if (Status status = mesh.validate(); !status) return unexpected(status.error());
     return mesh;
+}
+
+/// What a child sends: numbers of what follows, then the arrays.
+struct Reply {
+    uint64_t positions = 0, normals = 0, texcoords = 0, indices = 0, parts = 0, names = 0;
+};
+struct PartReply {
+    uint64_t first_index = 0, index_count = 0, name_size = 0;
+};
+
+/// A file without a name, written by one process and read by another.
+class Channel {
+public:
+    Channel() : descriptor_(::memfd_create("glint", MFD_CLOEXEC)) {}
+    ~Channel() {
+        if (descriptor_ >= 0) ::close(descriptor_);
+    }
+    Channel(const Channel&) = delete;
+    Channel& operator=(const Channel&) = delete;
+
+    bool isOpen() const { return descriptor_ >= 0; }
+    template <class T>
+    bool write(std::span<const T> values) {
+        const auto bytes = std::as_bytes(values);
+        for (size_t done = 0; done < bytes.size();) {
+            const ssize_t count = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
+            if (count <= 0) return false;
+            done += static_cast<size_t>(count);
+        }
+        return true;
+    }
+    template <class T>
+    bool read(std::vector<T>& values, uint64_t count) {
+        if (count > remaining() / sizeof(T)) return false;
+        values.resize(count);
+        const auto bytes = std::as_writable_bytes(std::span(values));
+        for (size_t done = 0; done < bytes.size();) {
+            const ssize_t got =
+                ::pread(descriptor_, bytes.data() + done, bytes.size() - done, static_cast<off_t>(offset_ + done));
+            if (got <= 0) return false;
+            done += static_cast<size_t>(got);
+        }
+        offset_ += bytes.size();
+        return true;
+    }
+    uint64_t remaining() const {
+        struct stat status = {};
+        if (::fstat(descriptor_, &status) != 0) return 0;
+        return static_cast<uint64_t>(status.st_size) - offset_;
+    }
+
+private:
+    int descriptor_;
+    uint64_t offset_ = 0;
+};
+
+bool send(Channel& channel, const Mesh& mesh) {
+    std::vector<PartReply> parts;
+    std::string names;
+    for (const MeshPart& part : mesh.parts) {
+        parts.push_back({part.first_index, part.index_count, part.name.size()});
+        names += part.name;
+    }
+    const Reply reply = {mesh.positions.size(), mesh.normals.size(), mesh.texcoords.size(),
+                         mesh.indices.size(),   parts.size(),        names.size()};
+    return channel.write(std::span(&reply, 1)) && channel.write(std::span<const Vector3f>(mesh.positions)) &&
+           channel.write(std::span<const Vector3f>(mesh.normals)) &&
+           channel.write(std::span<const Vector2f>(mesh.texcoords)) &&
+           channel.write(std::span<const uint32_t>(mesh.indices)) && channel.write(std::span<const PartReply>(parts)) &&
+           channel.write(std::span<const char>(names));
+}
+
+/// Nothing that the child says is taken on trust: it may have gone wrong before.
+bool receive(Channel& channel, Mesh& mesh) {
+    std::vector<Reply> reply;
+    std::vector<PartReply> parts;
+    std::vector<char> names;
+    if (!channel.read(reply, 1) || !channel.read(mesh.positions, reply[0].positions) ||
+        !channel.read(mesh.normals, reply[0].normals) || !channel.read(mesh.texcoords, reply[0].texcoords) ||
+        !channel.read(mesh.indices, reply[0].indices) || !channel.read(parts, reply[0].parts) ||
+        !channel.read(names, reply[0].names))
+        return false;
+    size_t offset = 0;
+    for (const PartReply& part : parts) {
+        if (part.name_size > names.size() - offset || part.first_index > UINT32_MAX || part.index_count > UINT32_MAX)
+            return false;
+        mesh.parts.push_back({.name = std::string(names.data() + offset, part.name_size),
+                              .first_index = static_cast<uint32_t>(part.first_index),
+                              .index_count = static_cast<uint32_t>(part.index_count)});
+        offset += part.name_size;
+    }
+    return true;
+}
+
+/// Exit statuses of the child.
+enum : int { Sent = 0, Refused = 1, Unsent = 2, TooLarge = 3 };
+
+/// In the child: reads the file and sends a mesh, or the text of an error.
+int import(const Library& assimp, const std::filesystem::path& path, uint64_t limit, Channel& channel) {
+    aiPropertyStore* properties = assimp.createProperties();
+    assimp.setInteger(properties, AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+    const aiScene* scene = assimp.import(path.c_str(),
+                                         aiProcess_Triangulate | aiProcess_SortByPType |
+                                             aiProcess_PreTransformVertices | aiProcess_JoinIdenticalVertices,
+                                         nullptr, properties);
+    if (!scene) {
+        const std::string_view text = assimp.error();
+        return channel.write(std::span<const char>(text)) ? Refused : Unsent;
+    }
+    const Expected<Mesh> mesh = collect(*scene, limit);
+    if (mesh) return send(channel, *mesh) ? Sent : Unsent;
+    return channel.write(std::span<const char>(mesh.error().message())) ? TooLarge : Unsent;
+}
+
+void setLimit(__rlimit_resource resource, uint64_t value) {
+    const rlimit limit = {value, value};
+    ::setrlimit(resource, &limit);
+}
+
+/// Bytes of address space that this process has.
+uint64_t addressSpace() {
+    const Expected<std::string> text = readTextFile("/proc/self/status");
+    const size_t place = text ? text->find("VmSize:") : std::string::npos;
+    return place == std::string::npos ? 0 : std::strtoull(text->c_str() + place + 7, nullptr, 10) * 1024;
 }
 
 }  // namespace
 
 Expected<Mesh> readThroughAssimp(const std::filesystem::path& path, uint64_t limit) {
-    std::error_code failure;
-    const uint64_t size = std::filesystem::file_size(path, failure);
-    if (failure)
-        return unexpected(
-            makeError(ErrorCode::Io, "file.open", "cannot open '{}': {}", path.string(), failure.message()));
-    if (size > limit)
+    const Expected<InputFile> file = InputFile::open(path);
+    if (!file) return unexpected(file.error());
+    if (file->size() > limit)
         return unexpected(makeError(ErrorCode::Io, "file.too_large", "'{}' has {} bytes, the limit is {}",
-                                    path.string(), size, limit));
-    const Library& assimp = library();
+                                    path.string(), file->size(), limit));
     const std::string name = path.filename().string();
-    if (!assimp.reason.empty())
-        return unexpected(Error::inFile(ErrorCode::Unsupported, "mesh.library", assimp.reason, name, 0));
+    const auto fail = [&](ErrorCode code, const char* id, const std::string& text) {
+        return unexpected(Error::inFile(code, id, text, name, 0));
+    };
+    const Library& assimp = library();
+    if (!assimp.reason.empty()) return fail(ErrorCode::Unsupported, "mesh.library", assimp.reason);
 
-    // The library keeps its error in one place for all threads.
-    static std::mutex mutex;
-    const std::lock_guard lock(mutex);
-    const std::unique_ptr<aiPropertyStore, decltype(assimp.releaseProperties)> properties(assimp.createProperties(),
-                                                                                          assimp.releaseProperties);
-    assimp.setInteger(properties.get(), AI_CONFIG_PP_SBP_REMOVE, aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-    const std::unique_ptr<const aiScene, decltype(assimp.release)> scene(
-        assimp.import(path.c_str(),
-                      aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_PreTransformVertices |
-                          aiProcess_JoinIdenticalVertices,
-                      nullptr, properties.get()),
-        assimp.release);
-    if (!scene)
-        return unexpected(Error::inFile(ErrorCode::InvalidArgument, "mesh.assimp",
-                                        fmt::format("assimp cannot read it: {}", assimp.error()), name, 0));
-    Expected<Mesh> mesh = collect(*scene, limit);
-    if (mesh) return mesh;
-    const Error& error = mesh.error();
-    return unexpected(Error::inFile(error.code(), error.id().data(), error.message(), name, 0));
+    // Damaged files make the library crash, or take all memory or time: it does so in a process of its own.
+    Channel channel;
+    const uint64_t memory = addressSpace() + 2 * limit + (uint64_t{1} << 30);
+    const uint64_t seconds = 10 + file->size() / 100'000;
+    const pid_t child = channel.isOpen() ? ::fork() : -1;
+    if (child < 0)
+        return fail(ErrorCode::OutOfMemory, "mesh.assimp",
+                    fmt::format("no process to read it: {}", std::strerror(errno)));
+    if (child == 0) {
+        setLimit(RLIMIT_AS, memory);
+        setLimit(RLIMIT_CPU, seconds);
+        setLimit(RLIMIT_CORE, 0);
+        const int nowhere = ::open("/dev/null", O_WRONLY);
+        if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+        ::_exit(import(assimp, path, limit, channel));
+    }
+    int status = 0;
+    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
+    if (WIFSIGNALED(status)) {
+        const int signal = WTERMSIG(status);
+        if (signal == SIGXCPU || signal == SIGKILL)
+            return fail(ErrorCode::InvalidArgument, "mesh.assimp",
+                        fmt::format("assimp has taken longer than {} s of a processor, or too much memory", seconds));
+        return fail(ErrorCode::InvalidArgument, "mesh.assimp", fmt::format("assimp crashes: {}", ::strsignal(signal)));
+    }
+    if (WEXITSTATUS(status) == Refused || WEXITSTATUS(status) == TooLarge) {
+        std::vector<char> letters;
+        channel.read(letters, channel.remaining());
+        const std::string text(letters.begin(), letters.end());
+        if (WEXITSTATUS(status) == TooLarge) return fail(ErrorCode::OutOfRange, "mesh.too_large", text);
+        return fail(ErrorCode::InvalidArgument, "mesh.assimp", text);
+    }
+    Mesh mesh;
+    if (WEXITSTATUS(status) != Sent || !receive(channel, mesh))
+        return fail(ErrorCode::OutOfMemory, "mesh.assimp", "what assimp has read cannot be taken over");
+    if (Status valid = mesh.validate(); !valid)
+        return fail(valid.error().code(), valid.error().id().data(), valid.error().message());
+    return mesh;
 }
 
 }  // namespace glint::detail

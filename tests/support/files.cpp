@@ -38,4 +38,10 @@ fs::path bunnyPath() {
     return fs::exists(path, ignored) ? path : fs::path();
 }
 
+fs::path assimpModelPath(std::string_view name) {
+    const fs::path path = fs::path("/usr/share/assimp/models") / name;
+    std::error_code ignored;
+    return fs::exists(path, ignored) ? path : fs::path();
+}
+
 }  // namespace glint::test

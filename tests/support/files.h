@@ -30,6 +30,14 @@ std::filesystem::path testsDir();
 /// The Stanford bunny of Debian's package glmark2-data (69,666 triangles); empty if the package is not installed.
 std::filesystem::path bunnyPath();
 
+/// A file of Debian's package assimp-testmodels, named as below its folder `models`; empty if it is not installed.
+std::filesystem::path assimpModelPath(std::string_view name);
+
+/// At the beginning of a test: skips it where the package is not installed.
+#define GLINT_NEED_ASSIMP_MODELS()                                       \
+    if (::glint::test::assimpModelPath("OBJ/box.obj").empty())           \
+    GTEST_SKIP() << "needs the models of Debian's package assimp-testmodels"
+
 /// At the beginning of a test: skips it where the bunny is not installed.
 #define GLINT_NEED_BUNNY() \
     if (::glint::test::bunnyPath().empty()) GTEST_SKIP() << "needs the Stanford bunny (Debian's package glmark2-data)"

@@ -1,5 +1,6 @@
-// `glint splat from-mesh` and `glint splat render`: scenes of splats made and rendered by the program.
+// `glint splat`: scenes of splats looked at, converted, made and rendered by the program.
 
+#include "support/splat_files.h"
 #include "unit/tool_test.h"
 
 #include <glint/format/image.h>
@@ -7,6 +8,7 @@
 #include <glint/geometry/primitives.h>
 
 #include <glm/geometric.hpp>
+#include <nlohmann/json.hpp>
 
 #include <sys/wait.h>
 #include <unistd.h>
@@ -40,6 +42,83 @@ protected:
 };
 
 }  // namespace
+
+TEST_F(SplatTool, TellsWhatAFileHolds) {
+    PlyRows rows = randomPlyRows(100, 2, 1);
+    for (size_t i = 0; i < rows.rows.size(); i++) rows.at(i, "opacity") = i < 40 ? -10.0f : 10.0f;
+    rows.at(3, "x") = NAN;
+    rows.at(4, "f_rest_3") = INFINITY;
+    rows.at(5, "opacity") = INFINITY;
+    for (const char* name : {"rot_0", "rot_1", "rot_2", "rot_3"}) rows.at(6, name) = 0.0f;
+    ASSERT_THAT(writeFile(dir / "a.ply", rows.bytes()), IsOk());
+    const std::string text = expectSuccess("splat info a.ply").output;
+    EXPECT_NE(text.find("splats       98\n  dropped    2 (1 position, 1 harmonics)\n"
+                        "  repaired   2 (1 rotation, 1 opacity)\ndegree       2\n"),
+              std::string::npos)
+        << text;
+    const auto json = nlohmann::json::parse(expectSuccess("splat info a.ply --json").output);
+    EXPECT_EQ(json.at("splats"), 98);
+    EXPECT_EQ(json.at("dropped").at("position"), 1);
+    EXPECT_EQ(json.at("repaired").at("opacity"), 1);
+    EXPECT_EQ(json.at("opacities"), nlohmann::json::parse("[37, 0, 0, 0, 0, 0, 0, 0, 0, 61]"));
+    EXPECT_EQ(json.at("host_bytes"), 98 * 4 * (11 + 27));
+    // Position, scale, opacity; rotation in two words; 27 halves, padded.
+    EXPECT_EQ(json.at("device_bytes").at("half"), 98 * 4 * (7 + 2 + 14));
+    const Splats splats = *Splats::load(dir / "a.ply");
+    EXPECT_EQ(json.at("centres").at(0).at(2).get<float>(), splats.bounds().min.z);
+
+    ASSERT_THAT(Splats().save(dir / "none.spz"), IsOk());
+    EXPECT_NE(expectSuccess("splat info none.spz").output.find("splats       0\n"), std::string::npos);
+    EXPECT_EQ(nlohmann::json::parse(expectSuccess("splat info none.spz --json").output).at("splats"), 0);
+    expectFailure("splat", 2, "tool.arguments");
+    expectFailure("splat info", 2, "tool.arguments");
+    expectFailure("splat info absent.ply", 1, "file.open");
+    expectFailure("splat info a.obj", 2, "splats.unknown_extension");
+    write("broken.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n");
+    expectFailure("splat info broken.ply", 2, "splats.property");
+}
+
+TEST_F(SplatTool, ConvertsFiles) {
+    const Splats splats = randomSplats(200, 3, 1);
+    ASSERT_THAT(splats.save(dir / "a.ply"), IsOk());
+    const Splats read = *Splats::load(dir / "a.ply");
+    expectSuccess("splat convert a.ply a.spz");
+    expectSuccess("splat convert a.spz a.splat");
+    EXPECT_EQ(Splats::load(dir / "a.spz")->degree, 3u);
+    EXPECT_EQ(Splats::load(dir / "a.splat")->size(), 200u);
+
+    const std::string text = expectSuccess("splat convert a.ply b.ply --degree 1 --min-opacity 0.5").output;
+    const Splats less = *Splats::load(dir / "b.ply");
+    size_t kept = 0;
+    for (size_t i = 0; i < read.size(); i++) {
+        if (read.opacities[i] < 0.5f) continue;
+        ASSERT_LT(kept, less.size());
+        EXPECT_EQ(less.positions[kept], read.positions[i]);
+        for (size_t k = 0; k < 4; k++) EXPECT_EQ(less.harmonics[4 * kept + k], read.harmonics[16 * i + k]);
+        kept++;
+    }
+    EXPECT_EQ(less.size(), kept);
+    EXPECT_EQ(less.degree, 1u);
+    EXPECT_TRUE(text.starts_with(fmt::format("{} of 200 splats written, of degree 1;", kept))) << text;
+
+    EXPECT_FALSE(Splats::load(dir / "a.spz")->is_antialiased);
+    expectSuccess("splat convert a.ply marked.spz --antialiased");
+    EXPECT_TRUE(Splats::load(dir / "marked.spz")->is_antialiased);
+    expectSuccess("splat convert marked.spz again.spz");
+    EXPECT_TRUE(Splats::load(dir / "again.spz")->is_antialiased);
+
+    const std::vector<std::string> before = files();
+    expectFailure("splat convert a.ply a.obj", 2, "splats.unknown_extension");
+    expectFailure("splat convert a.ply absent/a.spz", 1, "file.create");
+    expectFailure("splat convert a.ply", 2, "tool.arguments");
+    expectFailure("splat convert a.ply c.ply --degree 4", 2, "tool.arguments");
+    expectFailure("splat convert a.ply c.ply --min-opacity 1.5", 2, "tool.arguments");
+    Splats far = splats;
+    far.positions[7].x = 1e7f;
+    ASSERT_THAT(far.save(dir / "a.ply"), IsOk());
+    expectFailure("splat convert a.ply c.spz", 2, "splats.range");
+    EXPECT_EQ(files(), before);
+}
 
 TEST_F(SplatTool, MakesSplatsOfAMesh) {
     makeBall("a.ply", Vector3f(0.0f), "0.8,0.1,0.1");

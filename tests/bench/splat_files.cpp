@@ -23,7 +23,7 @@ constexpr FileFormat formats[] = {
 void run(Report& report) {
     const Device device = createDevice();
     test::SplatDrawer drawer(device);
-    for (const SplatScene& scene : splatViews(device)) {
+    for (const SplatScene& scene : splatViews()) {
         const auto picture = drawer.draw(scene, SplatModel::StorageFloat);
         const auto compare = [&](const std::string& name, const Splats& splats) {
             SplatScene changed = scene;

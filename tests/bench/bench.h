@@ -83,6 +83,8 @@ Benchmark splatFilesBenchmark();
 Benchmark splatAccuracyBenchmark();
 Benchmark splatTradeoffsBenchmark();
 Benchmark splatNeedlesBenchmark();
+Benchmark splatSpeedBenchmark();
+Benchmark splatGpuBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

@@ -56,7 +56,8 @@ int main(int argc, char** argv) {
         tracingBuildBenchmark(),     tracingDeviceBenchmark(),   tracingLeaksBenchmark(),   tracingDriverBenchmark(),
         tracingTradeoffsBenchmark(), tracingGpuBenchmark(),      castBenchmark(),           castMemoryBenchmark(),
         traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),       splatAccuracyBenchmark(),
-        splatLoadBenchmark(),        splatFilesBenchmark(),      splatTradeoffsBenchmark(), splatNeedlesBenchmark()};
+        splatLoadBenchmark(),        splatFilesBenchmark(),      splatTradeoffsBenchmark(), splatNeedlesBenchmark(),
+        splatSpeedBenchmark(),       splatGpuBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

@@ -148,7 +148,7 @@ void measureGpu(Report& report) {
         fmt::print("  for GPUs; {} is a CPU\n", device.getInfo().name);
         return;
     }
-    const std::vector<test::SplatScene> known = splatViews(device);
+    const std::vector<test::SplatScene> known = splatViews();
     const Splats& scene = known.front().splats;
     const BoundBox box = scene.bounds();
     const float pitch = std::max(box.size().x, box.size().z);
@@ -168,7 +168,7 @@ void measureGpu(Report& report) {
 Benchmark splatSpeedBenchmark() {
     return {{"splat.playbot.over_plain", "splat.mesh.over_plain"}, [](Report& report) {
                 Device device = createDevice();
-                for (const test::SplatScene& scene : splatViews(device)) compareWithPlain(report, device, scene);
+                for (const test::SplatScene& scene : splatViews()) compareWithPlain(report, device, scene);
             }};
 }
 

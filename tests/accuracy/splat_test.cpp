@@ -236,8 +236,7 @@ TEST_F(SplatAccuracyTest, TilesDoNotShow) {
                                needleScene(18, 5000.0f, 97, 65)};
     std::vector<SplatPicture> first;
     SplatRenderer::Options options;
-    for (const auto& [width, height] :
-         {std::pair(16u, 16u), std::pair(8u, 8u), std::pair(8u, 32u), std::pair(32u, 8u)}) {
+    for (const auto& [width, height] : {std::pair(16u, 16u), std::pair(8u, 32u), std::pair(32u, 8u)}) {
         options.tile_width = width;
         options.tile_height = height;
         SplatDrawer drawer(device, options);

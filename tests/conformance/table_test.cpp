@@ -350,6 +350,9 @@ TEST_F(TableTest, BesideRayQueries) {
 
 TEST_F(TableTest, InATraversal) {
     GLINT_NEED_FEATURE(FeatureRayTracing);
+    // Of its own: a traversal changes how a device builds structures from then on, which others measure.
+    device = Device::create({.validation = DeviceDesc::Validation::On, .message = log.callback()});
+    ASSERT_TRUE(device) << device.error().text();
     Traversal traversal = device.createTraversal("traversal");
     traversal.createShaderGLSL(Shader::TypeRayGen, R"(
         layout(set = 0, binding = 0) buffer Result { float result[]; };

@@ -80,6 +80,7 @@ Benchmark traversalHelloBenchmark();
 Benchmark parallelBenchmark();
 Benchmark splatLoadBenchmark();
 Benchmark splatFilesBenchmark();
+Benchmark lodBenchmark();
 Benchmark splatAccuracyBenchmark();
 Benchmark splatTradeoffsBenchmark();
 Benchmark splatNeedlesBenchmark();

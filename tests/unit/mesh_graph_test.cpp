@@ -205,7 +205,8 @@ TEST(MeshGraph, EveryCutHasTheMeshsBoundary) {
             EXPECT_TRUE(boundaryOf(mesh) == expected) << mesh.triangleCount() << " triangles";
             sizes.insert(mesh.triangleCount());
         }
-        if (c.mesh.triangleCount() > 3000) { EXPECT_GT(sizes.size(), 4u) << "always the same"; }
+        // Of the soup hardly an edge is one that can be simplified.
+        if (c.mesh.triangleCount() > 3000 && c.name != std::string("soup")) { EXPECT_GT(sizes.size(), 4u) << "always the same"; }
         // The finest one is the mesh, triangle by triangle.
         const Mesh finest = c.graph.mesh(c.graph.cut(-1.0f));
         EXPECT_EQ(finest.triangleCount(), withoutDegenerate(c.mesh).triangleCount());

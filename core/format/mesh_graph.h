@@ -65,18 +65,23 @@ static_assert(sizeof(MeshClusterGroup) == 64);
 /// From where a mesh is seen, in the mesh's own space, and how its errors look from there.
 struct MeshGraphView {
     Vector3f eye = {0, 0, 0};
-    float scale = 0.0f;  ///< pixels that a length of 1 at distance 1 takes at most, anywhere in the picture
-    float near = 0.0f;   ///< what is nearer than this is not in the picture
+    float scale = 0.0f;            ///< pixels that a length of 1 takes at most at depth 1, anywhere in the picture
+    Vector3f forward = {0, 0, 0};  ///< depth of a point p: dot(forward, p - eye)
+    float stretch = 0.0f;          ///< length of `forward`: by how much a ball's radius counts in depth
+    float slant = 0.0f;  ///< what is in the picture at a distance d from the eye has at least the depth slant * d
+    float near = 0.0f;   ///< depth of the near plane
 
-    /// For a camera, a picture of this size in pixels, and an instance of the mesh. A displacement by e at the distance
-    /// d from the eye moves a point in the picture by at most scale * e / d: f * (1 + x^2 + y^2) for the focal length
-    /// f in pixels and tangents x, y of the picture's corner, times the ratio of the largest to the smallest stretch
-    /// of the instance's transform, which may be anything invertible.
+    /// For a camera, a picture of this size in pixels, and an instance of the mesh, whose transform may be anything
+    /// invertible. docs/meshes.md derives the numbers.
     MeshGraphView() = default;
     MeshGraphView(const CameraParameters& camera, const Vector2u& size, const Transform3x4& instance = {});
 
-    /// Bound of a group's error in pixels, for what lies beyond the near distance. A group that contains another has at
-    /// least that group's value, rounding to float32 included: see docs/meshes.md.
+    /// Bound of a group's error in pixels, wherever it is in the picture:
+    ///
+    ///     error * scale / max(dot(forward, v) - stretch * radius, slant * (length(v) - radius), near)
+    ///
+    /// with v = center - eye. A group that contains another has at least that group's value, rounding to float32
+    /// included.
     float error(const MeshClusterGroup& group) const;
 };
 

@@ -43,22 +43,30 @@ bool MeshCluster::isFacingAway(const Vector3f& eye) const {
 
 MeshGraphView::MeshGraphView(const CameraParameters& camera, const Vector2u& size, const Transform3x4& instance) {
     const glm::dmat4 to_world(instance.matrix());
-    const auto [low, high] = squaredStretches(glm::dmat3(to_world));
-    eye = Vector3f(glm::inverse(to_world) * Vector4d(Vector3d(camera.position), 1.0));
+    const glm::dmat3 linear(to_world);
+    const auto [low, high] = squaredStretches(linear);
     const Vector2d focal(double{camera.projection[0][0]} * size.x / 2.0,
                          double{camera.projection[1][1]} * size.y / 2.0);
     const Vector2d corner(1.0 / camera.projection[0][0], 1.0 / camera.projection[1][1]);
-    const double smallest = std::sqrt(std::max(low, 0.0));
-    // Rounded up a little, as every bound is.
-    scale = static_cast<float>(std::max(std::abs(focal.x), std::abs(focal.y)) * (1.0 + glm::dot(corner, corner)) *
-                               std::sqrt(high) / smallest * (1.0 + 0x1p-20));
-    near = static_cast<float>(camera.projection[3][2] / smallest);
+    const double corner_slant = std::sqrt(1.0 + glm::dot(corner, corner));
+    // The camera looks along -Z.
+    const Vector3d axis = -Vector3d(glm::dmat4(camera.inverse_view)[2]);
+    eye = Vector3f(glm::inverse(to_world) * Vector4d(Vector3d(camera.position), 1.0));
+    forward = Vector3f(glm::transpose(linear) * axis);
+    // Bounds are rounded up, and what they are divided by down.
+    constexpr double up = 1.0 + 0x1p-20;
+    scale = static_cast<float>(std::max(std::abs(focal.x), std::abs(focal.y)) * corner_slant * std::sqrt(high) * up);
+    stretch = static_cast<float>(glm::length(Vector3d(forward)) * up);
+    slant = static_cast<float>(std::sqrt(std::max(low, 0.0)) / corner_slant / up);
+    near = camera.projection[3][2];
 }
 
 float MeshGraphView::error(const MeshClusterGroup& group) const {
     if (group.error == 0.0f) return 0.0f;
-    const float distance = std::max(glm::length(eye - group.center) - group.radius, near);
-    return distance > 0.0f ? group.error * scale / distance : std::numeric_limits<float>::infinity();
+    const Vector3f v = group.center - eye;
+    const float depth =
+        std::max({glm::dot(forward, v) - stretch * group.radius, slant * (glm::length(v) - group.radius), near});
+    return depth > 0.0f ? group.error * scale / depth : std::numeric_limits<float>::infinity();
 }
 
 std::span<const MeshCluster> MeshGraph::children(uint32_t cluster) const {

@@ -206,7 +206,9 @@ TEST(MeshGraph, EveryCutHasTheMeshsBoundary) {
             sizes.insert(mesh.triangleCount());
         }
         // Of the soup hardly an edge is one that can be simplified.
-        if (c.mesh.triangleCount() > 3000 && c.name != std::string("soup")) { EXPECT_GT(sizes.size(), 4u) << "always the same"; }
+        if (c.mesh.triangleCount() > 3000 && c.name != std::string("soup")) {
+            EXPECT_GT(sizes.size(), 4u) << "always the same";
+        }
         // The finest one is the mesh, triangle by triangle.
         const Mesh finest = c.graph.mesh(c.graph.cut(-1.0f));
         EXPECT_EQ(finest.triangleCount(), withoutDegenerate(c.mesh).triangleCount());
@@ -278,6 +280,7 @@ TEST(MeshGraph, PixelErrorsBoundThePicture) {
     const MeshGraph graph = *createMeshGraph(mesh);
     Random random(4);
     const std::vector<Vector3d> points = samplePoints(mesh, 0.2);
+    const NearestReference to_mesh(mesh);
     for (int i = 0; i < 12; i++) {
         Camera camera;
         const Vector3f eye(random.uniform(2.9, 30) * random.direction());
@@ -303,13 +306,16 @@ TEST(MeshGraph, PixelErrorsBoundThePicture) {
         };
         double largest = 0.0;
         size_t seen = 0;
-        for (size_t k = random.below(30); k < points.size(); k += 30) {
-            const Vector3d& p = points[k];
-            Vector2d a, b;
-            if (!project(p, a) || !project(nearest.nearest(p), b)) continue;
-            seen++;
-            largest = std::max(largest, glm::length((a - b) * Vector2d(size) * 0.5));
-        }
+        const auto measure = [&](const std::vector<Vector3d>& from, const NearestReference& to) {
+            for (size_t k = random.below(30); k < from.size(); k += 30) {
+                Vector2d a, b;
+                if (!project(from[k], a) || !project(to.nearest(from[k]), b)) continue;
+                seen++;
+                largest = std::max(largest, glm::length((a - b) * Vector2d(size) * 0.5));
+            }
+        };
+        measure(points, nearest);
+        measure(samplePoints(shown, 0.2), to_mesh);
         EXPECT_GT(seen, 100u);
         EXPECT_LE(largest, pixels) << cut.size() << " clusters from " << glm::length(eye);
     }

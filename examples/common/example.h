@@ -62,7 +62,7 @@ public:
     /// Further arguments of this example, to be added before parse(); what `value` holds before is the default.
     void add(const std::string& flag, std::string& value, const std::string& help);
     void add(const std::string& flag, std::filesystem::path& value, const std::string& help);
-    /// May be given several times.
+    /// May be given several times, or with several values.
     void add(const std::string& flag, std::vector<std::filesystem::path>& values, const std::string& help);
     void add(const std::string& flag, uint32_t& value, const std::string& help);
     void add(const std::string& flag, float& value, const std::string& help);

@@ -79,6 +79,22 @@ TEST(Example, EveryArgument) {
     EXPECT_EQ(kind, "plain");
 }
 
+TEST(Example, TakesSeveralFiles) {
+    Example example("07_splatting", "Splats.");
+    std::vector<std::filesystem::path> files;
+    example.add("--splats", files, "splats to show");
+    ASSERT_TRUE(parse(example, {"--splats", "a.ply", "--size", "64x36", "--splats", "b c.spz"}).parsed);
+    EXPECT_EQ(files, (std::vector<std::filesystem::path>{"a.ply", "b c.spz"}));
+    Example other("07_splatting", "Splats.");
+    other.add("--splats", files, "splats to show");
+    ASSERT_TRUE(parse(other, {"--splats", "c.ply", "d.ply", "--frames", "2"}).parsed);
+    EXPECT_EQ(files, (std::vector<std::filesystem::path>{"c.ply", "d.ply"}));
+    Example none("07_splatting", "Splats.");
+    none.add("--splats", files, "splats to show");
+    EXPECT_FALSE(parse(none, {"--splats"}).parsed);
+    EXPECT_EQ(none.exitCode(), 2);
+}
+
 TEST(Example, WrongArgumentsEndWithTwo) {
     const std::vector<std::vector<const char*>> cases = {{"--size"},
                                                          {"--size", "640"},

@@ -79,6 +79,9 @@ TEST(WindowExample, Particles) {
 // The same rays, from the same driver.
 TEST(WindowExample, Tracing) { expectSame("05_hello_tracing", "--time 0 --single", {}); }
 
+// Two draws of the same splats are equal to the bit.
+TEST(WindowExample, Splats) { expectSame("07_hello_splatting", "--time 0 --count 3000", {}); }
+
 TEST(WindowExample, WithoutADisplayThereIsAPictureAllTheSame) {
     const TempDir folder;
     const std::string path = folder.path().string();

@@ -97,7 +97,14 @@ void scanRegion(uint offset, uint size) {
 
 // Of a run; all before it have a sum of `sum`.
 void scanRun(uint begin, uint end, uint sum) {
-    for (uint i = begin; i < end; i++) {
+    uint i = begin;
+    for (; i + 4u <= end; i += 4u)
+        [[unroll]] for (uint k = 0u; k < 4u; k++) {
+            const uint value = data[i + k];
+            data[i + k] = sum;
+            sum += value;
+        }
+    for (; i < end; i++) {
         const uint value = data[i];
         data[i] = sum;
         sum += value;
@@ -105,8 +112,9 @@ void scanRun(uint begin, uint end, uint sum) {
 }
 
 uint sumRun(uint begin, uint end) {
-    uint sum = 0u;
-    for (uint i = begin; i < end; i++) sum += data[i];
+    uint sum = 0u, i = begin;
+    for (; i + 4u <= end; i += 4u) sum += data[i] + data[i + 1u] + data[i + 2u] + data[i + 3u];
+    for (; i < end; i++) sum += data[i];
     return sum;
 }
 

@@ -42,9 +42,9 @@ void PrefixScan::State::record(Compute& compute, const Buffer& data, const detai
     work.groups = regions.groups();
     if (mode == ModeMultiple) work.groups = std::min(work.groups, work.count);
     for (const Kernel& kernel : kernels) {
-        regions.bind(compute, kernel, source);
-        compute.setStorageBuffer(3, data);
-        if (mode == ModeSingle) compute.setStorageBuffer(4, sums);
+        regions.bind(compute, kernel, source, where);
+        compute.setStorageBuffer(Slot(3, where), data);
+        if (mode == ModeSingle) compute.setStorageBuffer(Slot(4, where), sums);
         regions.run(compute, work, kernel, work.groups, where);
     }
 }

@@ -157,11 +157,11 @@ void RadixSort::State::runPasses(Compute& compute, const Passes& passes, detail:
         work.bits = std::min(width, bits - std::min(i * width, bits));
         work.flipped = i % 2;
         for (const Stage stage : {StageCount, StageRows, StageMove}) {
-            regions.bind(compute, passes.kernels[stage], source);
+            regions.bind(compute, passes.kernels[stage], source, where);
             const Buffer& from = work.flipped ? scratch : data;
             const Buffer& to = work.flipped ? data : scratch;
-            compute.setStorageBuffers(3, {from, to, passes.table});
-            if (passes.kernels[StageList]) compute.setStorageBuffer(6, jobs);
+            compute.setStorageBuffers(Slot(3, where), {from, to, passes.table});
+            if (passes.kernels[StageList]) compute.setStorageBuffer(Slot(6, where), jobs);
             const uint32_t count_of_groups = stage == StageRows ? rows : std::min(regions.groups(), passes.shares);
             regions.run(compute, work, passes.kernels[stage], count_of_groups, where);
         }
@@ -174,13 +174,13 @@ void RadixSort::State::runRegions(Compute& compute, detail::ParallelWork work, c
     compute.clearBuffer(jobs, 0, 0, 8, where);
     work.bits = bits;
     const Kernel& list = multiple.kernels[StageList];
-    regions.bind(compute, list, source);
-    compute.setStorageBuffers(3, {data, scratch, jobs});
+    regions.bind(compute, list, source, where);
+    compute.setStorageBuffers(Slot(3, where), {data, scratch, jobs});
     regions.run(compute, work, list, std::min(regions.groups(), (work.count - 1) / regions.form().group + 1), where);
 
     const Kernel& small_regions = multiple.kernels[StageSmall];
-    regions.bind(compute, small_regions, source);
-    compute.setStorageBuffers(3, {data, small_scratch ? small_scratch : scratch});
+    regions.bind(compute, small_regions, source, where);
+    compute.setStorageBuffers(Slot(3, where), {data, small_scratch ? small_scratch : scratch});
     regions.run(compute, work, small_regions, std::min(work.groups, work.count), where);
 
     runPasses(compute, multiple, work, data, source, bits, where);

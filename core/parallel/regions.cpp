@@ -108,9 +108,9 @@ Status ParallelRegions::checkRange(const Buffer& data, uint64_t offset, uint64_t
                      "{} elements from element {} on, buffer '{}' has {}", size, offset, data.name(), words);
 }
 
-void ParallelRegions::bind(Compute& compute, const Kernel& kernel, const Source& source) const {
-    compute.setKernel(kernel);
-    compute.setStorageBuffers(0, {source.regions, source.counts, report_});
+void ParallelRegions::bind(Compute& compute, const Kernel& kernel, const Source& source, Where where) const {
+    compute.setKernel(kernel, where);
+    compute.setStorageBuffers(Slot(0, where), {source.regions, source.counts, report_});
 }
 
 void ParallelRegions::run(Compute& compute, const ParallelWork& work, const Kernel& kernel, uint32_t groups,

@@ -78,6 +78,7 @@ Benchmark tracingTradeoffsBenchmark();
 Benchmark traversalOffsetBenchmark();
 Benchmark traversalHelloBenchmark();
 Benchmark parallelBenchmark();
+Benchmark parallelGpuBenchmark();
 Benchmark splatLoadBenchmark();
 Benchmark splatFilesBenchmark();
 Benchmark lodBenchmark();

@@ -53,15 +53,23 @@ void sortOnHost(std::vector<uint32_t>& values, std::span<const Region> regions, 
 }
 
 /// The same for many regions, without copying all the values for each.
-void sortManyOnHost(std::vector<uint32_t>& values, std::span<const Region> regions, uint32_t bits) {
+void sortManyOnHost(std::vector<uint32_t>& values, std::span<const Region> regions, uint32_t bits,
+                    RadixSort::Flags flags = 0) {
     for (const Region& region : regions) {
         std::vector<uint32_t> part(values.begin() + region.keys, values.begin() + region.keys + region.size);
         part.insert(part.end(), values.begin() + region.payload, values.begin() + region.payload + region.size);
         const Region own = {0, region.size, region.size, 0};
-        sortOnHost(part, std::span(&own, 1), 0, bits);
+        sortOnHost(part, std::span(&own, 1), flags, bits);
         std::copy_n(part.begin(), region.size, values.begin() + region.keys);
         std::copy_n(part.begin() + region.size, region.size, values.begin() + region.payload);
     }
+}
+
+/// Lengths of regions as scenes have them: most are short, a few are long, some are empty.
+uint32_t anySize(std::mt19937& random, uint32_t most) {
+    const auto kind = random() % 100;
+    const uint32_t limit = kind < 10 ? 2 : kind < 85 ? 300 : kind < 98 ? 5000 : most;
+    return static_cast<uint32_t>(random() % limit);
 }
 
 /// Keys and payloads of these sizes, with gaps of 0 to 4 elements.
@@ -85,14 +93,51 @@ protected:
         SCOPED_TRACE(testing::Message() << size << " keys of kind " << static_cast<int>(kind) << ", " << bits
                                         << " bits");
         const bool has_payload = (flags & RadixSort::FlagKeys) == 0;
-        std::vector<uint32_t> values = makeValues((has_payload ? size_t{2} : size_t{1}) * size + 9, kind, size);
-        const Region region = {size % 3, size + 5, size, 0};
+        const size_t words = (has_payload ? size_t{2} : size_t{1}) * size;
+        // Between gaps, unless they are what the device cannot bind.
+        const bool has_gaps = (words + 9) * 4 <= device.getFeatures().maxStorageSize;
+        if (words * 4 > device.getFeatures().maxStorageSize) return;
+        std::vector<uint32_t> values = makeValues(words + (has_gaps ? 9 : 0), kind, size);
+        const Region region = has_gaps ? Region{size % 3, size + 5, size, 0} : Region{0, size, size, 0};
         const Buffer buffer = device.createBuffer(Buffer::FlagStorage, std::span(values));
         Compute compute = device.createCompute();
         sort.dispatch(compute, buffer, region.keys, region.payload, size, bits);
         ASSERT_THAT(device.submit(compute), IsOk());
         sortOnHost(values, std::span(&region, 1), flags, bits);
         expectValues(device, buffer, values);
+    }
+
+    /// Regions that do not overlap, of any length, by any number of bits, with any flags, from host or device.
+    void expectAnything(uint32_t seed) {
+        std::mt19937 random(seed);
+        const RadixSort::Flags payloads[] = {0u, RadixSort::FlagKeys, RadixSort::FlagOrder};
+        const RadixSort::Flags flags =
+            RadixSort::FlagMultiple | payloads[random() % 3] | (random() % 2 ? RadixSort::FlagSingle : 0u);
+        const auto bits = static_cast<uint32_t>(1 + random() % 32);
+        std::vector<uint32_t> sizes(random() % 200);
+        for (uint32_t& size : sizes) size = anySize(random, 70000);
+        SCOPED_TRACE(testing::Message() << "seed " << seed << ", flags " << flags << ", " << bits << " bits, "
+                                        << sizes.size() << " regions");
+        uint32_t end = 0;
+        const std::vector<Region> regions = layOut(sizes, end);
+        const uint32_t all = std::accumulate(sizes.begin(), sizes.end(), 0u);
+        std::vector<uint32_t> values = makeValues(end, all_keys[random() % 5], seed);
+        const Buffer buffer = device.createBuffer(Buffer::FlagStorage, std::span(values));
+        RadixSort sort;
+        ASSERT_THAT(sort.create(device, flags, all + 1, static_cast<uint32_t>(random() % 3 * 40), 200), IsOk());
+        Compute compute = device.createCompute();
+        if (random() % 2 || sizes.empty()) {
+            sort.dispatch(compute, buffer, regions, bits);
+        } else {
+            const Buffer where = device.createBuffer(Buffer::FlagStorage, std::span(regions));
+            const std::vector<uint32_t> count = {static_cast<uint32_t>(sizes.size())};
+            const Buffer how_many = device.createBuffer(Buffer::FlagStorage, std::span(count));
+            sort.dispatchIndirect(compute, buffer, how_many, where, 0, 0, bits);
+        }
+        ASSERT_THAT(device.submit(compute), IsOk());
+        sortManyOnHost(values, regions, bits, flags);
+        expectValues(device, buffer, values);
+        EXPECT_THAT(sort.check(), IsOk());
     }
 };
 
@@ -112,16 +157,36 @@ TEST_F(RadixSortTest, EqualsTheStandardSortInOneRegion) {
 }
 
 TEST_F(RadixSortLong, EqualsTheStandardSortInLargeRegions) {
-    // Pairs of 2^24 keys are more than some devices bind at once.
     for (const RadixSort::Flags flags : {RadixSort::FlagSingle | 0u, RadixSort::FlagSingle | RadixSort::FlagKeys}) {
-        const uint32_t most = flags & RadixSort::FlagKeys ? 24 : 23;
+        const uint64_t most = device.getFeatures().maxStorageSize / (flags & RadixSort::FlagKeys ? 4 : 8);
         RadixSort sort;
-        ASSERT_THAT(sort.create(device, flags, (1u << most) + 1), IsOk());
-        for (uint32_t k = 21; k <= most; k++)
+        ASSERT_THAT(sort.create(device, flags, static_cast<uint32_t>(std::min<uint64_t>(most, (1u << 24) + 1))),
+                    IsOk());
+        for (uint32_t k = 21; k <= 24; k++)
             for (const uint32_t size : {(1u << k) - 1, 1u << k, (1u << k) + 1})
                 expectSingle(sort, flags, size, all_keys[(size + k) % 5]);
-        for (const Keys kind : all_keys) expectSingle(sort, flags, 1u << most, kind);
+        for (const Keys kind : all_keys) expectSingle(sort, flags, 1u << 24, kind);
     }
+}
+
+TEST_F(RadixSortLong, EqualsTheStandardSortAtEverySize) {
+    std::vector<uint32_t> sizes(4100);
+    std::iota(sizes.begin(), sizes.end(), 0u);
+    uint32_t end = 0;
+    const std::vector<Region> regions = layOut(sizes, end);
+    std::vector<uint32_t> values = makeValues(end, Keys::Random, 1);
+    RadixSort sort;
+    ASSERT_THAT(sort.create(device, RadixSort::FlagSingle, 4099), IsOk());
+    const Buffer buffer = device.createBuffer(Buffer::FlagStorage, std::span(values));
+    for (size_t first = 0; first < regions.size(); first += 100) {
+        Compute compute = device.createCompute();
+        for (size_t i = first; i < first + 100; i++)
+            sort.dispatch(compute, buffer, regions[i].keys, regions[i].payload, regions[i].size);
+        ASSERT_THAT(device.submit(compute), IsOk());
+    }
+    sortManyOnHost(values, regions, 32);
+    expectValues(device, buffer, values);
+    EXPECT_THAT(sort.check(), IsOk());
 }
 
 TEST_F(RadixSortTest, TakesAnyNumberOfBitsWithAndWithoutPayloads) {
@@ -153,6 +218,35 @@ TEST_F(RadixSortTest, TakesEverySizeInOneList) {
     const Buffer buffer = device.createBuffer(Buffer::FlagStorage, std::span(values));
     Compute compute = device.createCompute();
     sort.dispatch(compute, buffer, regions);
+    ASSERT_THAT(device.submit(compute), IsOk());
+    sortManyOnHost(values, regions, 32);
+    expectValues(device, buffer, values);
+    EXPECT_THAT(sort.check(), IsOk());
+}
+
+TEST_F(RadixSortTest, TakesRegionsOfAnyLength) {
+    for (uint32_t seed = 1; seed <= 6; seed++) expectAnything(seed);
+}
+
+TEST_F(RadixSortLong, TakesManyRegionsOfAnyLength) {
+    for (uint32_t seed = 100; seed < 200; seed++) expectAnything(seed);
+}
+
+TEST_F(RadixSortLong, TakesTensOfThousandsOfRegionsAndALargeOne) {
+    std::mt19937 random(8);
+    std::vector<uint32_t> sizes(30000);
+    for (uint32_t& size : sizes) size = static_cast<uint32_t>(random() % 4097) >> random() % 8;
+    sizes[12345] = 1000000;
+    uint32_t end = 0;
+    const std::vector<Region> regions = layOut(sizes, end);
+    std::vector<uint32_t> values = makeValues(end, Keys::Random, 3);
+    const Buffer buffer = device.createBuffer(Buffer::FlagStorage, std::span(values));
+    const Buffer where = device.createBuffer(Buffer::FlagStorage, std::span(regions));
+    RadixSort sort;
+    // Small regions need no scratch memory.
+    ASSERT_THAT(sort.create(device, RadixSort::FlagMultiple, 1000000), IsOk());
+    Compute compute = device.createCompute();
+    sort.dispatchIndirect(compute, buffer, 30000, where);
     ASSERT_THAT(device.submit(compute), IsOk());
     sortManyOnHost(values, regions, 32);
     expectValues(device, buffer, values);
@@ -334,6 +428,12 @@ TEST_F(RadixSortTest, SaysWhatIsWrong) {
     expectFailure("handle.null", [&](Compute& c) { sort.dispatch(c, Buffer(), 0, 50, 1); });
     expectFailure("parallel.range", [&](Compute& c) { sort.dispatch(c, data, 51, 0, 50); });
     expectFailure("parallel.range", [&](Compute& c) { sort.dispatch(c, data, 0, 51, 50); });
+    if (limit < device.getFeatures().maxBufferSize && limit < (1ull << 30)) {
+        // What a device cannot bind at once.
+        const Buffer unbindable = device.createBuffer(Buffer::FlagStorage, limit + 4, "large");
+        expectFailure("bind.too_large", [&](Compute& c) { sort.dispatch(c, unbindable, 0, 50, 50); });
+        expectFailure("bind.too_large", [&](Compute& c) { many.dispatchIndirect(c, unbindable, regions); });
+    }
     expectFailure("sort.overlap", [&](Compute& c) { sort.dispatch(c, data, 0, 49, 50); });
     expectFailure("sort.overlap", [&](Compute& c) { sort.dispatch(c, data, 30, 30, 1); });
     expectFailure("sort.capacity", [&](Compute& c) { many.dispatch(c, data, large); });

@@ -68,7 +68,7 @@ public:
     Status checkRange(const Buffer& data, uint64_t offset, uint64_t size, Where where) const;
 
     /// Sets what all kernels have: regions, counts and report, in slots 0 to 2.
-    void bind(Compute& compute, const Kernel& kernel, const Source& source) const;
+    void bind(Compute& compute, const Kernel& kernel, const Source& source, Where where) const;
     void run(Compute& compute, const ParallelWork& work, const Kernel& kernel, uint32_t groups, Where where) const;
 
     Status check(Where where) const;

@@ -78,6 +78,7 @@ TEST_F(SplatAccuracyTest, HardCases) {
     for (const uint32_t threads : {8u, 64u}) {
         SplatRenderer::Options options;
         options.threads = threads;
+        options.tile_width = options.tile_height = 16;
         SplatDrawer drawer(device, options);
         for (const SplatScene& scene : hardSplatScenes()) expectAccurate(drawer, scene);
     }

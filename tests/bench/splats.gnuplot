@@ -35,11 +35,11 @@ set logscale x
 set xtics (16, 32, 64, 128, 256)
 set xrange [5:300]
 set yrange [5e-6:0.2]
-set xlabel 'bytes of a splat (numbers: degree of the harmonics)'
+set xlabel 'bytes of a splat'
 do for [s=1:words(scenes)] {
     set title 'Storage, '.word(scenes, s)
     set ylabel 'rmse against float32'
-    set key bottom left
+    set key bottom left Left reverse samplen 1 font ',11'
     plot for [i=1:5] data('storage', s) index i-1 using 2:3 with linespoints lw 2 pt points[i] ps 0.7 lc rgb colors[i] title names[i], \
          for [i=1:4] data('storage', s) index i-1 using 2:3:(sprintf('%d', $1)) with labels left offset 0.6,0.5 font ',10' tc rgb colors[i] notitle
 }
@@ -48,10 +48,10 @@ unset multiplot
 set output images.'/splat_degrees.svg'
 set multiplot layout 1,words(scenes)
 unset logscale x
-set xtics autofreq
+set xtics 0.1
 set xrange [0.7:1.15]
 set yrange [1e-6:0.2]
-set xlabel 'time of a picture, over the first (numbers: degree)'
+set xlabel 'time of a picture, over float32 with all'
 do for [s=1:words(scenes)] {
     set title 'Harmonics, '.word(scenes, s)
     set ylabel 'rmse against float64 with all'
@@ -72,7 +72,7 @@ set xtics (8, 16, 32)
 set xrange [6:40]
 set yrange [0.85:1.3]
 set logscale x
-set key top right
+set key top right Right noreverse samplen 4 font ',13'
 do for [s=1:words(scenes)] {
     set title 'Tiles, '.word(scenes, s)
     plot for [h=0:2] data('tiles', s) every :::h::h using 1:3 with linespoints lw 2 pt 7 ps 0.7 lc rgb colors[h+1] title sprintf('height %d', 8 * 2**h)

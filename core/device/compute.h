@@ -49,7 +49,9 @@ public:
     /// All texels of the slice; depth in color.r, stencil in color.g.
     void clearTexture(const Texture& texture, const Color& color, const Slice& slice = {},
                       Where where = Where::current());
-    /// Fills the mip levels above 0 from level 0, each from the one below.
+    /// Fills the mip levels above 0, each from the one below by a blit with a linear filter: sizes that halve evenly
+    /// give the mean of four texels (in a volume of eight), sRGB in linear values, to one unit of the last place a
+    /// level; odd sizes are sampled at the centres of their texels (docs/drawing.md). Errors: "mipmaps.format".
     void createMipmaps(const Texture& texture, Where where = Where::current());
 
     /// Replaces the instances of a top-level structure; at most as many as it has room for.

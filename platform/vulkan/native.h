@@ -44,7 +44,10 @@ struct DeviceImport {
     VkDevice device = VK_NULL_HANDLE;
     VkQueue queue = VK_NULL_HANDLE;  ///< for graphics, compute and copies
     uint32_t family = 0;
-    FeatureMask features = FeatureNone;  ///< those that the VkDevice was made with
+    /// Those that the VkDevice was made with. FeatureTextureTable and FeatureBufferTable mean nullDescriptor of
+    /// VK_EXT_robustness2 besides what their names say, FeatureVertexLayer shaderOutputLayer and
+    /// shaderOutputViewportIndex.
+    FeatureMask features = FeatureNone;
     MessageCallback message;
 };
 

@@ -63,15 +63,30 @@ public:
 
     void measure() {
         // Corners first: they are usually the farthest, and what is known to be far lets the rest be passed over.
-        std::vector<uint32_t> guesses(from_.size());
+        std::vector<uint32_t> vertices(from_.indices().begin(), from_.indices().begin() + size_t{3} * from_.size());
+        std::sort(vertices.begin(), vertices.end());
+        vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+        if (from_.positions().data() == to_.positions().data()) {
+            // A simplified mesh has vertices of the original one: the search for these is over where it begins.
+            at_vertex_.reserve(size_t{3} * to_.size());
+            for (uint32_t i = 0; i < 3 * to_.size(); i++) at_vertex_.emplace_back(to_.indices()[i], i / 3);
+            std::sort(at_vertex_.begin(), at_vertex_.end());
+        }
+        std::vector<uint32_t> nearest(vertices.size(), UINT32_MAX), guesses(from_.size());
         std::vector<double> uppers(from_.size());
+        uint32_t guess = 0;
         for (uint32_t i = 0; i < from_.size(); i++) {
             const auto corners = from_.triangle(i);
-            uint32_t guess = i > 0 ? guesses[i - 1] : 0;
             uppers[i] = std::numeric_limits<double>::infinity();
-            for (const Vector3d& corner : corners) {
-                guess = found(corner, guess);
-                uppers[i] = std::min(uppers[i], farthest(corners.data(), 3, guess).second);
+            uint32_t last = UINT32_MAX;
+            for (size_t k = 0; k < 3; k++) {
+                const uint32_t vertex = from_.indices()[i * size_t{3} + k];
+                uint32_t& found_before = nearest[static_cast<size_t>(
+                    std::lower_bound(vertices.begin(), vertices.end(), vertex) - vertices.begin())];
+                if (found_before == UINT32_MAX) found_before = found(corners[k], guessFor(vertex, guess));
+                guess = found_before;
+                if (guess != last) uppers[i] = std::min(uppers[i], farthest(corners.data(), 3, guess).second);
+                last = guess;
             }
             guesses[i] = guess;
         }
@@ -97,6 +112,12 @@ private:
         if (upper > std::max(result_.lower * tolerance_, floor_) && budget_ > 0) return false;
         result_.upper = std::max(result_.upper, upper);
         return true;
+    }
+
+    /// A triangle to begin the search for a vertex with.
+    uint32_t guessFor(uint32_t vertex, uint32_t otherwise) const {
+        const auto place = std::lower_bound(at_vertex_.begin(), at_vertex_.end(), std::pair(vertex, 0u));
+        return place != at_vertex_.end() && place->first == vertex ? place->second : otherwise;
     }
 
     /// Takes the distance of a point into account and returns the triangle nearest to it.
@@ -182,6 +203,7 @@ private:
     const double tolerance_;
     const double floor_;
     SurfaceDistance& result_;
+    std::vector<std::pair<uint32_t, uint32_t>> at_vertex_;  ///< vertex and triangle of the other surface
     std::vector<Piece> pieces_;
     uint64_t budget_ = 1;
 };

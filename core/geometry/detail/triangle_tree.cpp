@@ -3,6 +3,7 @@
 #include <glm/geometric.hpp>
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 
 namespace glint::detail {
@@ -31,16 +32,25 @@ Vector3d nearestPoint(const std::array<Vector3d, 3>& triangle, const Vector3d& p
     const Vector3d ab = b - a, ac = c - a, ap = point - a;
     const Vector3d normal = glm::cross(ab, ac);
     const double area2 = glm::dot(normal, normal);
+    std::array<double, 3> weights = {-1.0, -1.0, -1.0};  // barycentric coordinates of the projection
     if (area2 > 0.0) {
-        // Barycentric coordinates of the projection: it is the answer where none is negative.
-        const double v = glm::dot(glm::cross(ap, ac), normal) / area2;
-        const double w = glm::dot(glm::cross(ab, ap), normal) / area2;
-        if (v >= 0.0 && w >= 0.0 && v + w <= 1.0) return a + ab * v + ac * w;
+        weights[1] = glm::dot(glm::cross(ap, ac), normal) / area2;
+        weights[2] = glm::dot(glm::cross(ab, ap), normal) / area2;
+        weights[0] = 1.0 - weights[1] - weights[2];
+        if (weights[0] >= 0.0 && weights[1] >= 0.0 && weights[2] >= 0.0) return a + ab * weights[1] + ac * weights[2];
     }
-    // Otherwise it lies on an edge.
-    Vector3d best = nearestOnSegment(a, b, point);
-    for (const Vector3d& other : {nearestOnSegment(b, c, point), nearestOnSegment(c, a, point)})
-        if (distance2(other, point) < distance2(best, point)) best = other;
+    // Otherwise it lies on an edge, and on one that the projection lies beyond: the way from the nearest point is a sum
+    // of outward normals of its edges, and of two vectors one has a positive product with their sum.
+    Vector3d best = a;
+    double least = std::numeric_limits<double>::infinity();
+    for (size_t i = 0; i < 3; i++) {
+        if (!(weights[i] < 0.0)) continue;
+        const Vector3d candidate = nearestOnSegment(triangle[(i + 1) % 3], triangle[(i + 2) % 3], point);
+        const double distance = distance2(candidate, point);
+        if (distance >= least) continue;
+        least = distance;
+        best = candidate;
+    }
     return best;
 }
 

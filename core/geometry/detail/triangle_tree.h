@@ -31,6 +31,8 @@ public:
         return {Vector3d(positions_[indices_[i * size_t{3}]]), Vector3d(positions_[indices_[i * size_t{3} + 1]]),
                 Vector3d(positions_[indices_[i * size_t{3} + 2]])};
     }
+    std::span<const Vector3f> positions() const { return positions_; }
+    std::span<const uint32_t> indices() const { return indices_; }
     uint32_t size() const { return static_cast<uint32_t>(order_.size()); }
 
 private:

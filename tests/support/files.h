@@ -34,8 +34,8 @@ std::filesystem::path bunnyPath();
 std::filesystem::path assimpModelPath(std::string_view name);
 
 /// At the beginning of a test: skips it where the package is not installed.
-#define GLINT_NEED_ASSIMP_MODELS()                                       \
-    if (::glint::test::assimpModelPath("OBJ/box.obj").empty())           \
+#define GLINT_NEED_ASSIMP_MODELS()                             \
+    if (::glint::test::assimpModelPath("OBJ/box.obj").empty()) \
     GTEST_SKIP() << "needs the models of Debian's package assimp-testmodels"
 
 /// At the beginning of a test: skips it where the bunny is not installed.

@@ -23,9 +23,9 @@ struct SimplifiedMesh {
 };
 
 /// Removes triangles by collapsing edges where it matters least (meshoptimizer), part by part: parts keep the borders
-/// that they share. Topology stays: no holes, no merging. With `max_error`, the distance between the result and the
-/// original is at most that, as hausdorffDistance bounds it; the most simplified of some attempts that keeps it is the
-/// result, or the mesh as it was.
+/// that they share. The topology of a mesh whose edges have at most two triangles stays: no holes, no merging. With
+/// `max_error`, the distance between the result and the original is at most that, as hausdorffDistance bounds it; the
+/// most simplified of some attempts that keeps it is the result, or the mesh as it was.
 ///
 /// A vertex that has several normals or texture coordinates holds up simplifying: see weldPositions. Errors: those of
 /// Mesh::validate, "simplify.options" (a ratio outside of [0, 1], an error that is negative or NaN),

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <new>
 
 namespace glint {
 
@@ -23,28 +24,36 @@ Error unknownExtension(const std::filesystem::path& path) {
                      "'{}': splats end in .ply, .splat or .spz, not in '{}'", path.string(), path.extension().string());
 }
 
+Error outOfMemory(const std::filesystem::path& path) {
+    return makeError(ErrorCode::OutOfMemory, "splats.out_of_memory", "the host has no memory for '{}'", path.string());
+}
+
 }  // namespace
 
 Expected<Splats> Splats::load(const std::filesystem::path& path, uint64_t limit, SplatReport* report) {
     const std::string kind = extension(path);
-    if (kind == ".ply") return detail::loadPlySplats(path, limit, report);
-    if (kind == ".splat") return detail::loadDotSplat(path, limit, report);
-    if (kind == ".spz") {
-        const Expected<std::vector<std::byte>> bytes = readFile(path, limit);
-        if (!bytes) return unexpected(bytes.error());
-        return parseSpz(*bytes, path.filename().string(), limit, report);
-    }
+    try {
+        if (kind == ".ply") return detail::loadPlySplats(path, limit, report);
+        if (kind == ".splat") return detail::loadDotSplat(path, limit, report);
+        if (kind == ".spz") {
+            const Expected<std::vector<std::byte>> bytes = readFile(path, limit);
+            if (!bytes) return unexpected(bytes.error());
+            return parseSpz(*bytes, path.filename().string(), limit, report);
+        }
+    } catch (const std::bad_alloc&) { return unexpected(outOfMemory(path)); }
     return unexpected(unknownExtension(path));
 }
 
 Status Splats::save(const std::filesystem::path& path) const {
     const std::string kind = extension(path);
     if (kind != ".ply" && kind != ".splat" && kind != ".spz") return unknownExtension(path);
-    const Expected<std::vector<std::byte>> bytes = kind == ".ply"     ? encodePlySplats(*this)
-                                                   : kind == ".splat" ? encodeDotSplat(*this)
-                                                                      : encodeSpz(*this);
-    if (!bytes) return bytes.error();
-    return writeFile(path, *bytes);
+    try {
+        const Expected<std::vector<std::byte>> bytes = kind == ".ply"     ? encodePlySplats(*this)
+                                                       : kind == ".splat" ? encodeDotSplat(*this)
+                                                                          : encodeSpz(*this);
+        if (!bytes) return bytes.error();
+        return writeFile(path, *bytes);
+    } catch (const std::bad_alloc&) { return outOfMemory(path); }
 }
 
 Status Splats::validate() const {

@@ -58,12 +58,14 @@ struct Splats {
 
     /// Reads a file; its ending says which format it has (".ply", see parsePlySplats; ".splat", see parseDotSplat;
     /// ".spz", see parseSpz). `report`, if there is one, says what became of bad values. Splats keep the order of the
-    /// file. Errors: those of readFile, "splats.unknown_extension" and those of the format; they name the file.
+    /// file. Errors: those of readFile, "splats.unknown_extension", "splats.out_of_memory" and those of the format;
+    /// they name the file.
     static Expected<Splats> load(const std::filesystem::path& path, uint64_t limit = default_limit,
                                  SplatReport* report = nullptr);
 
     /// Writes a file, as its ending says (".ply", see encodePlySplats; ".splat", see encodeDotSplat; ".spz", see
-    /// encodeSpz). Errors: those of writeFile, "splats.unknown_extension" and those of the format.
+    /// encodeSpz). Errors: those of writeFile, "splats.unknown_extension", "splats.out_of_memory" and those of the
+    /// format.
     Status save(const std::filesystem::path& path) const;
 
     size_t size() const { return positions.size(); }

@@ -85,3 +85,28 @@ TEST(File, WritersDoNotMix) {
     }
     for (std::thread& writer : writers) writer.join();
 }
+
+TEST(File, InPieces) {
+    const TempDir dir;
+    ASSERT_THAT(writeTextFile(dir / "a", "0123456789"), IsOk());
+    const Expected<InputFile> file = InputFile::open(dir / "a");
+    ASSERT_THAT(file, IsOk());
+    EXPECT_EQ(file->size(), 10u);
+    const auto read = [&](uint64_t offset, size_t size) {
+        std::string text(size, ' ');
+        return file->read(offset, std::as_writable_bytes(std::span(text))) ? text : "none";
+    };
+    EXPECT_EQ(read(0, 10), "0123456789");
+    EXPECT_EQ(read(7, 3), "789");
+    EXPECT_EQ(read(2, 4), "2345");
+    EXPECT_EQ(read(10, 0), "");
+    EXPECT_EQ(read(7, 4), "none");
+    EXPECT_EQ(read(11, 1), "none");
+    // Somebody makes it shorter while it is read.
+    std::filesystem::resize_file(dir / "a", 5);
+    std::string text(4, ' ');
+    EXPECT_THAT(file->read(3, std::as_writable_bytes(std::span(text))), HasErrorId("file.read"));
+    EXPECT_THAT(InputFile::open(dir / "absent"), HasErrorId("file.open"));
+    EXPECT_THAT(InputFile::open(dir.path()), HasErrorId("file.open"));
+    EXPECT_THAT(InputFile::open("/dev/zero"), HasErrorId("file.read"));
+}

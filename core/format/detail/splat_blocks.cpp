@@ -11,6 +11,7 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <new>
 #include <optional>
 #include <type_traits>
 
@@ -183,17 +184,23 @@ Expected<Splats> readSplats(const SplatSource& source, uint64_t limit, SplatRepo
     if (Status status = checkSplatBytes(source, limit); !status) return unexpected(status.error());
     Splats splats;
     splats.degree = source.degree;
-    splats.positions.reserve(source.count);
-    splats.scales.reserve(source.count);
-    splats.rotations.reserve(source.count);
-    splats.opacities.reserve(source.count);
-    splats.harmonics.reserve(source.count * splats.coefficientCount());
+    try {
+        splats.positions.reserve(source.count);
+        splats.scales.reserve(source.count);
+        splats.rotations.reserve(source.count);
+        splats.opacities.reserve(source.count);
+        splats.harmonics.reserve(source.count * splats.coefficientCount());
+    } catch (const std::bad_alloc&) {
+        return unexpected(Error::inFile(ErrorCode::OutOfMemory, "splats.out_of_memory",
+                                        fmt::format("the host has no memory for {} splats", source.count), source.name,
+                                        0));
+    }
 
-    // Threads read and judge blocks, this one appends them in order: an array of fresh memory is best filled by one.
+    // Threads read and judge blocks, this one appends them in order. More than a few would only wait for it.
     constexpr uint64_t capacity = SplatBlock::capacity;
     const uint64_t blocks = (source.count + capacity - 1) / capacity;
     const auto threads = static_cast<uint32_t>(
-        std::min<uint64_t>(std::max(1u, std::thread::hardware_concurrency()), blocks > 1 ? blocks : 0));
+        std::min<uint64_t>(std::clamp(std::thread::hardware_concurrency(), 1u, 4u), blocks > 1 ? blocks : 0));
     std::deque<Slot> slots;
     for (uint64_t i = 0; i < std::min<uint64_t>(2 * threads + 1, blocks); i++) slots.emplace_back(source);
     std::optional<ThreadPool> pool;  // ends before the slots do

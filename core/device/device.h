@@ -209,7 +209,8 @@ public:
     // Submission.
 
     /// Plays the lists in this order, after the queued transfers. Recorders are closed and cannot be submitted again
-    /// ("submit.twice"). The first error of any of them, or of a queued transfer, is returned and nothing is played.
+    /// ("submit.twice"). The first error of any of them, or of a queued transfer, is returned and nothing is played;
+    /// after an error of a list the transfers stay queued.
     /// All recorders must be for one queue ("submit.queue").
     Status submit(std::initializer_list<SubmitItem> items, const Fence& fence = {}, Where where = Where::current());
     Status submit(Recorder& recorder, const Fence& fence = {}, Where where = Where::current()) {

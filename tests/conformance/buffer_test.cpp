@@ -100,6 +100,22 @@ TEST_P(BufferTest, WritesAtOffsetsComeInOrder) {
     EXPECT_EQ(read<uint8_t>(buffer), (std::vector<uint8_t>{0, 0, 0, 1, 2, 1, 4, 5, 0, 0, 0, 0, 0, 0, 0, 1}));
 }
 
+TEST_P(BufferTest, AFailedListLeavesWhatIsQueued) {
+    const Buffer buffer = device.createBuffer(Buffer::FlagStorage, 64);
+    device.clearBuffer(buffer, 0x01020304);
+    Compute failing = device.createCompute();
+    expectError("copy.range", [&] {
+        failing.clearBuffer(buffer, 0, 128, 4);
+        return device.submit(failing);
+    });
+    device.clearBuffer(buffer, 0x05060708, 0, 4);
+    auto words = device.read<uint32_t>(buffer);
+    ASSERT_THAT(words, IsOk());
+    EXPECT_EQ(words->front(), 0x05060708u);
+    words->front() = 0x01020304;
+    EXPECT_EQ(*words, std::vector<uint32_t>(16, 0x01020304));
+}
+
 TEST_P(BufferTest, PartialReads) {
     const Buffer buffer = makeBuffer(bytes(1000));
     const Expected<std::vector<uint8_t>> part = device.read<uint8_t>(buffer, 3, 10);

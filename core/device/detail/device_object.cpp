@@ -277,16 +277,20 @@ Status DeviceObject::submit(std::span<RecorderCore* const> recorders, FenceObjec
                                   "submit: recorders of different queues in one call");
             if (error) return failed(error, where);
         }
-        transfers = std::exchange(transfers_, nullptr);
-        if (transfers) error = transfers->end(where).error();
-        if (transfers && !error && (error = checkPictures(*transfers))) (void)failed(error, where);
-        if (transfers && !error && (error = transfers->placeTracings())) (void)failed(error, where);
         for (RecorderCore* recorder : recorders) {
             const Status ended = recorder->end(where);
             if (!ended && !error) error = ended.error();
             if (!error && (error = checkPictures(*recorder))) error = failed(error, where).error();
-            if (!error && (error = recorder->placeTracings())) error = failed(error, where).error();
             recorder->submitted = true;
+        }
+        // A list that has failed leaves what is queued to the next submission: nobody would hand its data over again.
+        if (!error) {
+            transfers = std::exchange(transfers_, nullptr);
+            if (transfers) error = transfers->end(where).error();
+            if (transfers && !error && (error = checkPictures(*transfers))) (void)failed(error, where);
+            if (transfers && !error && (error = transfers->placeTracings())) (void)failed(error, where);
+            for (RecorderCore* recorder : recorders)
+                if (!error && (error = recorder->placeTracings())) error = failed(error, where).error();
         }
         if (error) {
             status = error;  // reported when it happened

@@ -214,9 +214,7 @@ TEST_F(SplatAccuracyTest, TheCutTakesNoMoreThanItsAlphas) {
         const auto splat = projectSplat({&faint->splats}, i, camera, faint->width, faint->height);
         ASSERT_TRUE(splat);
         for (size_t at = 0; at < left_out.size(); at++) {
-            const Vector2d pixel(static_cast<double>(at % faint->width) + 0.5,
-                                 static_cast<double>(at / faint->width) + 0.5);
-            const double alpha = splat->opacity * std::exp(splat->power(pixel - splat->centre));
+            const double alpha = splat->opacity * std::exp(splat->power(expected.place(at) - splat->centre));
             if (alpha < 1.0 / 255.0) left_out[at] += alpha;
         }
     }

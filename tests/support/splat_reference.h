@@ -67,6 +67,12 @@ struct SplatPicture {
     std::vector<Vector3d> color;        ///< sum of T alpha color: what covers a black background
     std::vector<double> transmittance;  ///< T behind the last splat
     std::vector<double> depth;          ///< sum of T alpha depth over 1 - T; infinity where that is 0
+
+    /// The centre of a pixel, in pixels from the top left corner.
+    Vector2d place(size_t pixel) const {
+        const size_t row = pixel / width;
+        return {static_cast<double>(pixel - row * width) + 0.5, static_cast<double>(row) + 0.5};
+    }
 };
 
 /// The whole picture, on all cores. Where the settings leave nothing out, the result still differs from the sum over

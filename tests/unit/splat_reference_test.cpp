@@ -265,8 +265,7 @@ TEST(SplatReferenceTest, NothingIsLostInTiles) {
         for (size_t at = 0; at < expected.color.size(); at++) {
             double transmittance = 1.0;
             for (const ProjectedSplat& splat : splats) {
-                const Vector2d pixel(static_cast<double>(at % 53) + 0.5, static_cast<double>(at / 53) + 0.5);
-                const double alpha = splat.opacity * std::exp(splat.power(pixel - splat.centre));
+                const double alpha = splat.opacity * std::exp(splat.power(expected.place(at) - splat.centre));
                 expected.color[at] += transmittance * alpha * splat.color;
                 transmittance *= 1.0 - alpha;
                 largest_color = std::max({largest_color, splat.color.x, splat.color.y, splat.color.z});

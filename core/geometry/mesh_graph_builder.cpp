@@ -85,8 +85,8 @@ private:
 
     BuiltCluster& addCluster(std::vector<uint32_t> indices, uint32_t part) {
         BuiltCluster& cluster = clusters_.emplace_back();
-        std::vector<Vector3f> points;
-        for (const uint32_t vertex : indices) points.push_back(mesh_.positions[vertex]);
+        std::vector<Vector3f> points(indices.size());
+        for (size_t i = 0; i < indices.size(); i++) points[i] = mesh_.positions[indices[i]];
         cluster.ball = BoundSphere(points);
         cluster.box = BoundBox(points);
         cluster.indices = std::move(indices);
@@ -135,8 +135,8 @@ private:
     /// With `done` indices of this level seen to, each of which leaves half of one.
     bool tell(uint64_t done) {
         if (!options_.progress) return true;
-        told_ =
-            std::max(told_, 1.0f - static_cast<float>(left_ - std::min(done, left_) / 2) / static_cast<float>(work_));
+        const uint64_t halved = std::min(done, left_) / 2;
+        told_ = std::max(told_, 1.0f - static_cast<float>(left_ - halved) / static_cast<float>(work_));
         return options_.progress(told_);
     }
 

@@ -183,7 +183,11 @@ MeshGraphView randomView(Random& random, const Mesh& mesh, double nearest, doubl
     const Vector3f center = mesh.bounds().center();
     camera.lookAt(center + Vector3f(distance * random.direction()), center);
     camera.perspective(60.0f, 16.0f / 9.0f, 0.01f);
-    return MeshGraphView(camera.parameters(), {1600, 900});
+    // Mostly as it is, sometimes turned, mirrored and stretched by 1 : 10.
+    const Matrix4x4f to_world = random.below(3) > 0 ? Matrix4x4f(1.0f)
+                                                    : rotateX(40.0f) * scale({0.3f, -3.0f, 1.0f}) *
+                                                          rotateZ(static_cast<float>(random.uniform(0, 360)));
+    return MeshGraphView(camera.parameters(), {1600, 900}, Transform3x4(to_world));
 }
 
 }  // namespace

@@ -14,8 +14,8 @@ namespace glint {
 /// they may begin anywhere and have any size, 0 included, but must not overlap. What lies outside is not written.
 ///
 /// Two ways, and the flags say which are prepared: FlagSingle spreads one region over the whole device; FlagMultiple
-/// gives each region to one group, for many regions of some thousand elements. A dispatch of one region takes the first
-/// if it is there.
+/// takes many regions of any lengths: short ones a group each, long ones spread over the device. A dispatch of one
+/// region takes the first if it is there.
 ///
 /// Dispatches set the list's kernel, its storage buffers from slot 0 on and its push constants. Recording calls fail
 /// the list; what only the device can see is found by check(). A region that fails is left as it was. Lists of one
@@ -40,11 +40,12 @@ public:
         uint32_t padding = 0;
     };
 
-    /// `size`: the most elements of one dispatch, all regions together; scratch memory is 8 bytes for each, 4 with
-    /// FlagKeys, and at most Features::maxStorageSize. `groups`: how many work at a time, 0 as many as suit the device.
-    /// `regions`: the most that one dispatch takes from the host. Errors: "sort.flags" if neither FlagSingle nor
-    /// FlagMultiple is there or FlagKeys and FlagOrder both are, "sort.capacity" if the size is 0 or too large,
-    /// "parallel.regions", those of buffers and kernels.
+    /// `size`: the most elements of one dispatch, all regions together; of regions from the device, of each of them and
+    /// of the long ones together. Scratch memory is 8 bytes for each, 4 with FlagKeys, and at most
+    /// Features::maxStorageSize; counts take about a quarter byte more each way. `groups`: how many work at a time, 0
+    /// as many as suit the device. `regions`: the most that one dispatch takes from the host. Errors: "sort.flags" if
+    /// neither FlagSingle nor FlagMultiple is there or FlagKeys and FlagOrder both are, "sort.capacity" if the size is
+    /// 0 or too large, "parallel.regions", those of buffers and kernels.
     Status create(const Device& device, Flags flags, uint32_t size, uint32_t groups = 0, uint32_t regions = 1,
                   Where where = Where::current());
     /// True once create() has succeeded.

@@ -1,8 +1,10 @@
-// Particles: emitters spawn them, compute shaders move them and count the living, an indirect draw shows them.
+// Particles: emitters spawn them, compute shaders move, count and sort the living, an indirect draw blends them from
+// the farthest to the nearest.
 
 #include "common/viewer.h"
 
 #include <glint/math/camera.h>
+#include <glint/parallel/radix_sort.h>
 
 #include <algorithm>
 #include <array>
@@ -25,7 +27,7 @@ struct Emitter {
     Vector4f position;   // w: particles to spawn in this step
     Vector4f direction;  // w: velocity
     Vector4f spread;     // velocity spread, radius mean and spread, life mean
-    Vector4f damping;    // velocity damping, twist damping, life spread, seed
+    Vector4f damping;    // damping, opacity, life spread, seed
     Vector4f color;
 };
 
@@ -42,7 +44,7 @@ struct Particle {
     Vector4f position;  // w: radius
     Vector4f velocity;  // w: life left
     Vector4f color;     // w: whole life
-    Vector4f twist;     // angle, speed, damping of velocity and of twist
+    Vector4f twist;     // angle, speed, damping of both speeds, opacity
 };
 
 struct View {
@@ -63,12 +65,12 @@ std::vector<Emitter> emittersAt(float time, std::array<float, emitter_pairs * 2>
         fountain.position = position;
         fountain.direction = {0.0f, 0.0f, 1.0f, 12.0f};
         fountain.spread = {2.0f + 4.0f * std::abs(std::sin(time)), 0.12f, 0.06f, 4.0f};
-        fountain.damping = {0.5f + 0.5f * std::abs(std::sin(time)), 0.5f, 1.5f, static_cast<float>(2 * i)};
+        fountain.damping = {0.5f + 0.5f * std::abs(std::sin(time)), 0.7f, 1.5f, static_cast<float>(2 * i)};
         fountain.color = Vector4f(hue * 0.35f, 1.0f);
         Emitter burst = fountain;
         burst.direction = {0.0f, 0.0f, 1.0f, 2.0f};
         burst.spread = {20.0f, 0.05f, 0.05f, 0.3f};
-        burst.damping = {0.5f, 0.5f, 0.2f, static_cast<float>(2 * i + 1)};
+        burst.damping = {0.5f, 0.0f, 0.2f, static_cast<float>(2 * i + 1)};
         burst.color = {0.5f, 0.35f, 0.2f, 1.0f};
         const float rates[2] = {2500.0f, 10000.0f};
         Emitter* pair[2] = {&fountain, &burst};
@@ -107,14 +109,15 @@ int main(int argc, char** argv) {
     Kernel emit = loadKernel("emit", "EMIT_SHADER=1; GROUP_SIZE=128");
     Kernel arguments = loadKernel("arguments", "ARGUMENTS_SHADER=1; GROUP_SIZE=128");
     Kernel update = loadKernel("update", "UPDATE_SHADER=1; GROUP_SIZE=128");
+    Kernel keys = loadKernel("keys", "KEYS_SHADER=1; GROUP_SIZE=128");
     Kernel tone = loadKernel("tone", "TONE_SHADER=1");
-    for (const Kernel& kernel : {emit, arguments, update, tone})
+    for (const Kernel& kernel : {emit, arguments, update, keys, tone})
         if (!kernel) return report(kernel.error());
 
     Pipeline draw = device.createPipeline("particles");
     draw.setColorFormat(FormatRGBAf16);
     draw.setPrimitive(Pipeline::PrimitiveTriangleStrip);
-    draw.setBlend(Pipeline::BlendOpAdd, Pipeline::BlendFuncOne, Pipeline::BlendFuncOne);
+    draw.setBlend(Pipeline::BlendOpAdd, Pipeline::BlendFuncOne, Pipeline::BlendFuncInvSrcAlpha);
     draw.loadShaderGLSL(Shader::TypeVertex, EXAMPLE_DIR "/main.shader", "VERTEX_SHADER=1");
     draw.loadShaderGLSL(Shader::TypeFragment, EXAMPLE_DIR "/main.shader", "FRAGMENT_SHADER=1");
     if (!draw.create()) return report(draw.error());
@@ -126,7 +129,13 @@ int main(int argc, char** argv) {
         buffer = device.createBuffer(Buffer::FlagStorage, max_particles * sizeof(Particle), "particles");
     Buffer counters = device.createBuffer(Buffer::FlagStorage, 2 * sizeof(uint32_t), "counters");
     Buffer indirect = device.createBuffer(Buffer::FlagStorage | Buffer::FlagIndirect, 7 * sizeof(uint32_t), "indirect");
-    device.clearBuffer(counters);
+    // Keys of the particles, then their numbers in the order of the keys; and which of both there are.
+    Buffer order = device.createBuffer(Buffer::FlagStorage, 2 * max_particles * sizeof(uint32_t), "order");
+    Buffer region = device.createBuffer(Buffer::FlagStorage, sizeof(RadixSort::Region), "region");
+    for (const Buffer& buffer : {counters, indirect, region}) device.clearBuffer(buffer);
+    RadixSort sort;
+    if (Status status = sort.create(device, RadixSort::FlagSingle | RadixSort::FlagOrder, max_particles); !status)
+        return report(status.error());
 
     Texture light;
     Target target;
@@ -162,7 +171,7 @@ int main(int argc, char** argv) {
             compute.dispatch(emitters.size() * group_size);
 
             compute.setKernel(arguments);
-            compute.setStorageBuffers(0, {counters, indirect});
+            compute.setStorageBuffers(0, {counters, indirect, region});
             compute.setPushConstants(0u);
             compute.dispatch(1);
 
@@ -172,7 +181,7 @@ int main(int argc, char** argv) {
 
             // The survivors are what is drawn, and what the next step begins with.
             compute.setKernel(arguments);
-            compute.setStorageBuffers(0, {counters, indirect});
+            compute.setStorageBuffers(0, {counters, indirect, region});
             compute.setPushConstants(1u);
             compute.dispatch(1);
             if (last) frame.timer.end(compute);
@@ -185,11 +194,21 @@ int main(int argc, char** argv) {
         Camera camera;
         camera.lookAt(frame.view.eye({30.0f * std::cos(angle), 30.0f * std::sin(angle), 16.0f}, centre), centre);
         camera.perspective(60.0f, frame.aspect());
+        const View view = {camera.parameters()};
+        Compute sorting = device.createCompute();
+        frame.timer.begin(sorting, "sort");
+        sorting.setKernel(keys);
+        sorting.setUniform(0, view);
+        sorting.setStorageBuffers(0, {particles[0], counters, order});
+        sorting.dispatchIndirect(indirect);
+        sort.dispatchIndirect(sorting, order, region);
+        frame.timer.end(sorting);
+
         Command command = device.createCommand(target);
         frame.timer.begin(command, "draw");
         command.setPipeline(draw);
-        command.setUniform(0, View{camera.parameters()});
-        command.setStorageBuffer(0, particles[0]);
+        command.setUniform(0, view);
+        command.setStorageBuffers(0, {particles[0], order});
         command.drawArraysIndirect(indirect, 3 * sizeof(uint32_t));
         frame.timer.end(command);
 
@@ -200,15 +219,17 @@ int main(int argc, char** argv) {
         compute.setSurfaceTexture(0, frame.picture);
         compute.dispatch(frame.picture);
         frame.timer.end(compute);
-        return device.submit({command, compute});
+        return device.submit({sorting, command, compute});
     });
     if (!status) return report(status.error());
 
     const Expected<std::vector<uint32_t>> count = device.read<uint32_t>(counters);
     if (!count) return report(count.error());
+    if (Status sorted = sort.check(); !sorted) return report(sorted.error());
     example.statistics().counts["particles"] = (*count)[0];
     example.statistics().counts["steps"] = steps;
-    std::printf("%u particles after %u steps, %.1f ms a step, %.1f ms to draw\n", (*count)[0], steps,
-                example.statistics().median("simulate") * 1e-6, example.statistics().median("draw") * 1e-6);
+    std::printf("%u particles after %u steps, %.1f ms a step, %.1f ms to sort, %.1f ms to draw\n", (*count)[0], steps,
+                example.statistics().median("simulate") * 1e-6, example.statistics().median("sort") * 1e-6,
+                example.statistics().median("draw") * 1e-6);
     return viewer.finish();
 }

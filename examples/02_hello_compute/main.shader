@@ -2,7 +2,7 @@ struct Particle {
     vec4 position;  // w: radius
     vec4 velocity;  // w: life left
     vec4 color;     // w: whole life
-    vec4 twist;     // angle, speed, damping of velocity and of twist
+    vec4 twist;     // angle, speed, damping of both speeds, opacity
 };
 
 #if EMIT_SHADER || UPDATE_SHADER
@@ -28,7 +28,7 @@ struct Emitter {
     vec4 position;   // w: particles to spawn
     vec4 direction;  // w: velocity
     vec4 spread;     // velocity spread, radius mean and spread, life mean
-    vec4 damping;    // velocity damping, twist damping, life spread, seed
+    vec4 damping;    // damping, opacity, life spread, seed
     vec4 color;
 };
 
@@ -83,7 +83,7 @@ void main() {
 #elif ARGUMENTS_SHADER
 
 // Between the passes: before the update the source's count becomes its groups, after it the destination's count becomes
-// the draw's instances and the next source's count.
+// the draw's instances, the region that is sorted and the next source's count.
 
 layout(local_size_x = 1) in;
 
@@ -91,6 +91,7 @@ layout(push_constant) uniform Phase { uint is_after; };
 
 layout(std430, set = 0, binding = 0) buffer Counters { uint counters[2]; };
 layout(std430, set = 0, binding = 1) writeonly buffer Indirect { uint indirect[7]; };
+layout(std430, set = 0, binding = 2) writeonly buffer Region { uint region[4]; };  // keys, payload, size
 
 const uint limit = 1u << 20;
 
@@ -107,6 +108,9 @@ void main() {
         indirect[4] = counters[1];
         indirect[5] = 0u;
         indirect[6] = 0u;
+        region[0] = 0u;
+        region[1] = limit;
+        region[2] = counters[1];
     }
 }
 
@@ -133,11 +137,11 @@ void main() {
         particle.velocity.z = abs(particle.velocity.z) * 0.5;
     }
     particle.twist.x += particle.twist.y * time_step;
-    particle.twist.y *= exp(-particle.twist.w * time_step);
+    particle.twist.y *= exp(-particle.twist.z * time_step);
     destination[atomicAdd(counters[1], 1u)] = particle;
 }
 
-#elif VERTEX_SHADER
+#elif KEYS_SHADER || VERTEX_SHADER
 
 struct Camera {
     mat4 view, inverse_view, projection;
@@ -147,31 +151,56 @@ struct Camera {
 layout(set = 0, binding = 0) uniform View { Camera camera; };
 layout(std430, set = 0, binding = 1) readonly buffer Particles { Particle particles[]; };
 
-layout(location = 0) out vec2 s_texcoord;
-layout(location = 1) out vec3 s_color;
+#if KEYS_SHADER
+
+#include <glint/parallel/key.h>
+
+layout(local_size_x = GROUP_SIZE) in;
+
+layout(std430, set = 0, binding = 2) readonly buffer Counters { uint counters[2]; };
+layout(std430, set = 0, binding = 3) writeonly buffer Order { uint order[]; };
 
 void main() {
-    Particle particle = particles[gl_InstanceIndex];
+    uint index = gl_GlobalInvocationID.x;
+    if (index >= counters[0]) return;
+    // The view looks along -z, so that the farthest have the smallest keys.
+    order[index] = glintSortKey((camera.view * vec4(particles[index].position.xyz, 1.0)).z);
+}
+
+#else
+
+// Keys, then the numbers of the particles in the order of their keys.
+layout(std430, set = 0, binding = 2) readonly buffer Order { uint order[]; };
+const uint limit = 1u << 20;
+
+layout(location = 0) out vec2 s_texcoord;
+layout(location = 1) out vec4 s_color;
+
+void main() {
+    Particle particle = particles[order[limit + gl_InstanceIndex]];
     vec2 corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 2.0 - 1.0;
     float s = sin(particle.twist.x), c = cos(particle.twist.x);
     vec4 position = camera.view * vec4(particle.position.xyz, 1.0);
     position.xy += mat2(c, s, -s, c) * corner * particle.position.w;
     gl_Position = camera.projection * position;
     s_texcoord = corner;
-    s_color = particle.color.rgb * smoothstep(0.0, 0.5, particle.velocity.w / particle.color.w);
+    // What is opaque covers what is behind it, what is not adds its light.
+    s_color = vec4(particle.color.rgb, particle.twist.w) * smoothstep(0.0, 0.5, particle.velocity.w / particle.color.w);
 }
+
+#endif
 
 #elif FRAGMENT_SHADER
 
 layout(location = 0) in vec2 s_texcoord;
-layout(location = 1) in vec3 s_color;
+layout(location = 1) in vec4 s_color;
 
 layout(location = 0) out vec4 out_color;
 
 void main() {
     float edge = 1.0 - dot(s_texcoord, s_texcoord);
     if (edge <= 0.0) discard;
-    out_color = vec4(s_color * edge * edge, 0.0);
+    out_color = s_color * edge * edge;
 }
 
 #elif TONE_SHADER

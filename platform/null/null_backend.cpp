@@ -62,7 +62,7 @@ Features describeFeatures(FeatureMask mask, const NullSettings& settings) {
     features.maxTextureLayers = 256;
     features.maxTextureSamples = 8;
     features.maxTargets = max_targets;
-    features.maxTargetLayers = 256;
+    features.maxTargetLayers = 128;  // fewer than a texture has
     features.maxViewports = mask & FeatureMultiViewport ? max_viewports : 1;
     features.maxIndirectDraws = mask & FeatureMultiDrawIndirect ? 65536 : 1;
     if (features.meshShader) {

@@ -448,6 +448,93 @@ TEST_F(NullDevice, StructuresWhoseUploadFailsAreUnbuilt) {
     }
 }
 
+// Draws and tables.
+
+TEST_F(NullDevice, CountsOfDrawsAreRead) {
+    const std::array<uint32_t, 3> counts = {2, 9, 0};
+    const Buffer count = device.createBuffer(Buffer::FlagIndirect, counts.data(), sizeof(counts), "count");
+    const Buffer arguments = device.createBuffer(Buffer::FlagIndirect, 256, "arguments");
+    Pipeline pipeline = device.createPipeline("pipeline");
+    pipeline.createShaderGLSL(Shader::TypeVertex, "void main() { gl_Position = vec4(0.0); }");
+    pipeline.createShaderGLSL(Shader::TypeFragment, "layout(location = 0) out vec4 c; void main() { c = vec4(1.0); }");
+    pipeline.setColorFormat(FormatRGBAu8n);
+    ASSERT_THAT(pipeline.create(), IsOk());
+    const Target target = device.createTarget(device.createTexture2D(FormatRGBAu8n, 8, 8, Texture::FlagTarget));
+    const auto drawn = [&](uint64_t offset) {
+        const uint64_t before = control->counters().draws;
+        Command list = device.createCommand(target);
+        list.setPipeline(pipeline);
+        list.drawArraysIndirect(arguments, 0, count, offset, 5);
+        EXPECT_THAT(device.submit(list), IsOk());
+        return control->counters().draws - before;
+    };
+    EXPECT_EQ(drawn(0), 2u);
+    EXPECT_EQ(drawn(4), 5u);
+    EXPECT_EQ(drawn(8), 0u);
+}
+
+TEST_F(NullDevice, TargetsOfManyLayersAreRefused) {
+    const uint32_t limit = device.getFeatures().maxTargetLayers;
+    ASSERT_LT(limit, device.getFeatures().maxTextureLayers);
+    const Texture layers = device.createTexture(
+        {.format = FormatRGBAu8n, .width = 1, .height = 1, .layers = limit + 1, .flags = Texture::FlagTarget},
+        "layers");
+    Target target = device.createTarget();
+    target.setColorTexture(0, layers, {.layer = 1});
+    EXPECT_THAT(device.submit(device.createCommand(target)), IsOk());
+    target.setColorTexture(0, layers);
+    expected = "target.layers";
+    EXPECT_THAT(device.submit(device.createCommand(target)), HasErrorId("target.layers"));
+}
+
+TEST_F(NullDevice, TablesKeepWhatListsUnderWayRead) {
+    Kernel kernel = device.createKernel("kernel");
+    kernel.createShaderGLSL(R"(
+        layout(local_size_x = 1) in;
+        layout(set = 0, binding = 0) uniform texture2D textures[];
+        layout(set = 1, binding = 0) buffer Part { float value; } parts[];
+        void main() { parts[0].value = texelFetch(textures[1], ivec2(0), 0).x; })");
+    ASSERT_THAT(kernel.create(), IsOk());
+    const null::NullCounters before = control->counters();
+    control->hold(Queue::Main);
+    {
+        TextureTable textures = device.createTextureTable(4, "textures");
+        BufferTable parts = device.createBufferTable(2, "parts");
+        for (uint32_t round = 0; round < 3; round++) {
+            textures.set(1, device.createTexture2D(FormatRGBAu8n, 8, 8, 0, "picture"));
+            parts.set(0, device.createBuffer(Buffer::FlagStorage, 64, "part"));
+            Compute list = device.createCompute();
+            list.setKernel(kernel);
+            list.setTextureTable(0, textures);
+            list.setBufferTable(1, parts);
+            list.dispatch(1);
+            EXPECT_THAT(device.submit(list), IsOk());
+        }
+    }
+    // Three of each kind of contents with a texture or a buffer each; what is deleted too early is a finding.
+    EXPECT_EQ(control->counters().objects, before.objects + 12);
+    control->release(Queue::Main);
+    EXPECT_THAT(device.finish(), IsOk());
+    EXPECT_EQ(control->counters().objects, before.objects);
+}
+
+TEST_F(NullDevice, TablesThatCannotBeCopiedFail) {
+    const null::NullCounters before = control->counters();
+    {
+        TextureTable table = device.createTextureTable(4, "textures");
+        Compute list = device.createCompute();
+        list.setTextureTable(0, table);
+        control->failCreation(1);
+        expected = "device.out_of_memory";
+        table.set(2, Texture());  // a list has seen the contents
+        EXPECT_EQ(table.error().id(), "device.out_of_memory");
+        EXPECT_EQ(told, 1);
+        control->failCreation(1);
+        EXPECT_EQ(device.createBufferTable(4).error().id(), "device.out_of_memory");
+    }
+    EXPECT_EQ(control->counters().objects, before.objects);
+}
+
 // Time.
 
 TEST_F(NullDevice, HeldQueuesDoNotFinish) {

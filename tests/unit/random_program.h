@@ -375,7 +375,7 @@ private:
             else if (below(8) == 0)
                 build(list);
             else
-                dispatch(list);
+                dispatch(list, queue, tracked);
             list.popRegion();
         }
         if (!tracked) list.barrier();
@@ -414,7 +414,7 @@ private:
         }
     }
 
-    void dispatch(Compute& list) {
+    void dispatch(Compute& list, Queue queue, bool tracked) {
         switch (below(10)) {
             case 0:
                 list.setKernel(programs_.gather);
@@ -484,6 +484,13 @@ private:
             list.dispatchIndirect(buffer(), 16);
         else
             list.dispatch(8);
+        // The same bindings again, perhaps after something that they have to come after.
+        for (size_t i = below(3); i > 0; i--) {
+            if (!tracked) list.barrier();
+            if (below(2)) copy(list, queue);
+            if (!tracked) list.barrier();
+            list.dispatch(8);
+        }
         list.clearUses();
     }
 
@@ -568,6 +575,7 @@ private:
                     case 1: list.drawMeshIndirect(buffer(), 0, buffer(), 4 * below(4), 8); break;
                     default: list.drawMesh(3); break;
                 }
+                if (below(2)) list.drawMesh(1);
                 continue;
             }
             switch (below(5)) {
@@ -579,6 +587,7 @@ private:
                 case 1: list.drawArraysIndirect(buffer()); break;
                 default: list.drawArrays(3); break;
             }
+            if (below(2)) list.drawArrays(3);
         }
     }
 

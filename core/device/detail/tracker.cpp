@@ -30,6 +30,7 @@ void Tracker::resolve(Queue queue, uint64_t value, std::span<const CommandList* 
     resolved_.clear();
     waits_.clear();
     undo_.clear();
+    known_ = {};
 
     ranges_.clear();
     for (const CommandList* list : lists) {
@@ -67,16 +68,7 @@ void Tracker::resolveList(const CommandList& list) {
             require(all_stages, all_stages);
         }
         untracked_ = header.untracked;
-        // All accesses are ordered after what was before the command, and only then remembered: no barrier lies between
-        // the stages of one command.
-        const auto forEachAccess = [&](auto step) {
-            for (uint32_t i = 0; i < header.access_count; i++)
-                forEachState(list, list.accesses[header.first_access + i], step);
-            for (uint32_t i = 0; i < header.shared_count; i++)
-                forEachState(list, list.accesses[header.first_shared + i], step);
-        };
-        forEachAccess(&Tracker::order);
-        forEachAccess(&Tracker::record);
+        playAccesses(list, header);
         if (header.type == CommandType::EndTarget && target) {
             in_target_ = false;
             // Attachments are written until here, also by the parts that splits have made.
@@ -86,6 +78,29 @@ void Tracker::resolveList(const CommandList& list) {
         }
         if (!in_target_) closeBarrier();
     });
+}
+
+// All accesses are ordered after what was before the command, and only then remembered: no barrier lies between the
+// stages of one command.
+void Tracker::playAccesses(const CommandList& list, const CommandHeader& header) {
+    const std::span own = std::span(list.accesses).subspan(header.first_access, header.access_count);
+    const std::span shared = std::span(list.accesses).subspan(header.first_shared, header.shared_count);
+    const auto isKnown = [&] {
+        return known_.list == &list && known_.first == header.first_shared && known_.count == header.shared_count &&
+               known_.untracked == untracked_ && known_.changes == changes_;
+    };
+    for (const Access& access : own) forEachState(list, access, &Tracker::order);
+    if (!isKnown())
+        for (const Access& access : shared) forEachState(list, access, &Tracker::order);
+    for (const Access& access : own) forEachState(list, access, &Tracker::record);
+    if (isKnown()) return;
+    bool writes = false;
+    for (const Access& access : shared) {
+        forEachState(list, access, &Tracker::record);
+        writes = writes || access.flags & AccessWrite;
+    }
+    known_ = {};
+    if (!writes && !shared.empty()) known_ = {&list, header.first_shared, header.shared_count, untracked_, changes_};
 }
 
 void Tracker::openBarrier(uint32_t command, bool is_split) {
@@ -114,6 +129,7 @@ void Tracker::split() {
 }
 
 void Tracker::require(StageMask source, StageMask destination) {
+    changes_++;
     if (barrier_ == no_barrier) openBarrier(command_, false);
     Barrier& barrier = barriers_[barrier_];
     barrier.source |= source;
@@ -234,6 +250,7 @@ void Tracker::record(ResourceState& state, const Access& access, const Slice&) {
         own.stages |= stage;
         return;
     }
+    changes_++;
     const bool joins = state.write_queue == queue_ && state.write_position == position_ && !state.visible;
     state.write_value = value_;
     state.write_position = position_;
@@ -253,12 +270,14 @@ bool Tracker::joinTransition(ResourceState& state, const Access& access, const S
         joined = true;
     }
     if (!joined) return false;
+    changes_++;
     state.visible |= bit(access.stage);
     state.write_stages |= bit(access.stage);
     return true;
 }
 
 void Tracker::endAttachment(const CommandList& list, const Access& access) {
+    changes_++;
     auto* texture = static_cast<TextureObject*>(list.resources[access.resource]);
     for (uint32_t layer = access.slice.layer; layer < access.slice.layer + access.slice.layers; layer++)
         for (uint32_t mip = access.slice.mip; mip < access.slice.mip + access.slice.mips; mip++)
@@ -272,6 +291,7 @@ bool Tracker::covers(const Slice& range, const Slice& single) {
 
 void Tracker::addTransition(uint32_t resource, const Slice& slice, Layout from, Layout to, StageMask source,
                             StageMask destination) {
+    changes_++;
     if (barrier_ == no_barrier) openBarrier(command_, false);
     pending_images_.push_back({resource, slice, from, to, source, destination});
     // Subresources come mip by mip, then layer by layer: join neighbours, so that a whole texture is one transition.

@@ -40,11 +40,21 @@ private:
         std::array<uint64_t, queue_count> waited = {};
         std::array<std::array<uint64_t, stage_count>, stage_count> ordered = {};
     };
+    /// The bindings of the command before, if they only read: while nothing has changed since, a command with the same
+    /// ones, of which a table makes thousands, is ordered already, and its reads may count as those before.
+    struct Known {
+        const CommandList* list = nullptr;
+        uint32_t first = 0;
+        uint32_t count = 0;
+        bool untracked = false;
+        uint64_t changes = 0;
+    };
     struct Undo {
         ResourceState* state;
         ResourceState old;
     };
     void resolveList(const CommandList& list);
+    void playAccesses(const CommandList& list, const CommandHeader& header);
     using Step = void (Tracker::*)(ResourceState& state, const Access& access, const Slice& slice);
     void forEachState(const CommandList& list, const Access& access, Step step);
     /// Adds to the barrier what orders the access after everything before its command.
@@ -81,6 +91,8 @@ private:
     uint32_t command_ = 0;
     bool untracked_ = false;
     bool in_target_ = false;
+    uint64_t changes_ = 0;  ///< writes, transitions and barriers so far
+    Known known_;
     uint32_t barrier_ = 0;
     uint64_t barrier_position_ = 0;
     std::vector<ImageBarrier> pending_images_;

@@ -83,7 +83,9 @@ std::vector<SplatStorage> splatStorages() {
              }},
             {"default",
              [](const Splats& splats) -> StoredSplats {
-                 return {SplatModel::decoded(splats, SplatModel::StorageHalf), 36.0 + 6.0 * splats.coefficientCount()};
+                 // Harmonics fill words of two.
+                 const uint32_t words = (3 * splats.coefficientCount() + 1) / 2;
+                 return {SplatModel::decoded(splats, SplatModel::StorageHalf), 36.0 + 4.0 * words};
              }},
             {"float16 covariance", asHalfCovariance},
             {".spz", asSpz},

@@ -11,12 +11,13 @@ namespace glint {
 // by corner, up to which corner comes first), and triangles stay in their part. Deterministic. Indices have to be in
 // range.
 
-/// Makes one vertex of those that are equal in every attribute, and drops vertices that no triangle uses and triangles
-/// with two corners at one place. Returns how many vertices and triangles that took away.
+/// What welding has taken away.
 struct MeshWeld {
     uint64_t vertices = 0;
     uint64_t triangles = 0;
 };
+/// Makes one vertex of those that are equal in every attribute, and drops vertices that no triangle uses and triangles
+/// with two corners at one place.
 MeshWeld weld(Mesh& mesh);
 
 /// Makes one vertex of all those at one position, without normals and texture coordinates: what a flat-shaded mesh
@@ -36,16 +37,17 @@ void optimizeVertexFetch(Mesh& mesh);
 /// All three, in the order in which they build on each other.
 void optimize(Mesh& mesh);
 
-/// What an order costs, by meshoptimizer's models of a device.
+/// What an order costs.
 struct MeshOrderStatistics {
     double acmr = 0.0;       ///< vertices transformed for each triangle, with a cache of 16: 0.5 at best, 3 at worst
     double atvr = 0.0;       ///< vertices transformed for each vertex in use: 1 at best
     double overdraw = 0.0;   ///< pixels shaded for each pixel covered, from six sides: 1 at best
     double overfetch = 0.0;  ///< bytes fetched for each byte of vertices in use, of 32 bytes each: 1 at best
 };
+/// Takes it from meshoptimizer's models of a device.
 MeshOrderStatistics orderStatistics(const Mesh& mesh);
 
-/// What a mesh is like. Edges are counted by position, without triangles that have two corners at one place.
+/// What a mesh is like.
 struct MeshStatistics {
     uint64_t triangles = 0;
     uint64_t vertices = 0;
@@ -63,6 +65,7 @@ struct MeshStatistics {
     double volume = 0.0;  ///< within a closed mesh
     bool isClosed() const { return edges > 0 && open_edges + non_manifold_edges + turned_edges == 0; }
 };
+/// Edges are counted by position, without triangles that have two corners at one place.
 MeshStatistics statistics(const Mesh& mesh);
 
 }  // namespace glint

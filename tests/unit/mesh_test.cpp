@@ -361,7 +361,7 @@ TEST(Mesh, Files) {
     EXPECT_EQ(mesh->bounds(), BoundBox({0, 0, 0}, {1, 1, 0}));
     EXPECT_THAT(Mesh::load(dir / "b.obj"), HasErrorId("file.open"));
     EXPECT_THAT(Mesh::load(dir / "a.obj", 10), HasErrorId("file.too_large"));
-    EXPECT_THAT(Mesh::load(dir / "a.fbx"), HasErrorId("mesh.unknown_extension"));
+    EXPECT_THAT(Mesh::load(dir / "a.xyz"), HasErrorId("mesh.unknown_extension"));
     EXPECT_THAT(Mesh::load(dir / "a"), HasErrorId("mesh.unknown_extension"));
     ASSERT_THAT(writeTextFile(dir / "bad.OBJ", "v 0 0 0\nf 1 2 3\n"), IsOk());
     const Expected<Mesh> bad = Mesh::load(dir / "bad.OBJ");

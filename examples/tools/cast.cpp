@@ -182,16 +182,11 @@ Expected<RayCaster> createCaster(const Options& options, Outcome& outcome) {
     outcome.instances = (*target)->instances.size();
 
     const Stopwatch watch(outcome.seconds.build);
-    // Errors are returned, too: one line is enough. What the validation layer says is not.
-    const auto tell = [](const Message& message) {
-        if (message.error.id() == "vulkan.validation") fmt::print(stderr, "{}\n", message.error.text());
-    };
-    const Device device = Device::create({.api = options.api,
-                                          .adapter = options.adapter,
-                                          .required = FeatureComputeTracing,
-                                          .optional = FeatureTimestamps,
-                                          .tracing = options.tracing,
-                                          .message = tell});
+    const Device device = openDevice({.api = options.api,
+                                      .adapter = options.adapter,
+                                      .required = FeatureComputeTracing,
+                                      .optional = FeatureTimestamps,
+                                      .tracing = options.tracing});
     if (!device) return unexpected(device.error());
     outcome.info = device.getInfo();
     outcome.engine = device.getFeatures().tracingEngine;

@@ -30,6 +30,13 @@ bool isFailure(const glint::Error& error) {
 
 }  // namespace
 
+glint::Device openDevice(glint::DeviceDesc desc) {
+    desc.message = [](const glint::Message& message) {
+        if (message.error.id() == "vulkan.validation") fmt::print(stderr, "{}\n", message.error.text());
+    };
+    return glint::Device::create(desc);
+}
+
 void addTracing(CLI::App& app, glint::TracingEngine& engine) {
     // The check has it before the function is called.
     app.add_option_function<std::string>(

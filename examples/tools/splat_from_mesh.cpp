@@ -30,16 +30,11 @@ Expected<Splats> make(const Options& options) {
     Expected<Mesh> mesh = Mesh::load(options.mesh);
     if (!mesh) return unexpected(mesh.error());
     if (mesh->normals.empty()) mesh->createNormals();
-    // Errors are returned, too: one line is enough. What the validation layer says is not.
-    const auto tell = [](const Message& message) {
-        if (message.error.id() == "vulkan.validation") fmt::print(stderr, "{}\n", message.error.text());
-    };
-    const Device device = Device::create({.api = options.api,
-                                          .adapter = options.adapter,
-                                          .required = FeatureComputeTracing,
-                                          .optional = FeatureTimestamps,
-                                          .tracing = options.tracing,
-                                          .message = tell});
+    const Device device = openDevice({.api = options.api,
+                                      .adapter = options.adapter,
+                                      .required = FeatureComputeTracing,
+                                      .optional = FeatureTimestamps,
+                                      .tracing = options.tracing});
     if (!device) return unexpected(device.error());
     Expected<RayCaster> caster = RayCaster::create(device, *mesh);
     if (!caster) return unexpected(caster.error());

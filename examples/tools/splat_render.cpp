@@ -220,11 +220,7 @@ public:
 
 private:
     Status prepare(const std::vector<Splats>& scenes) {
-        // Errors are returned, too: one line is enough. What the validation layer says is not.
-        const auto tell = [](const Message& message) {
-            if (message.error.id() == "vulkan.validation") fmt::print(stderr, "{}\n", message.error.text());
-        };
-        device_ = Device::create({.api = options_.api, .adapter = options_.adapter, .message = tell});
+        device_ = openDevice({.api = options_.api, .adapter = options_.adapter});
         if (!device_) return device_.error();
         SplatRenderer::Options rendering = options_.rendering;
         rendering.antialiased |=

@@ -3,7 +3,7 @@
 // What the subcommands of `glint` share.
 
 #include <glint/base/error.h>
-#include <glint/device/features.h>
+#include <glint/device/device.h>
 #include <glint/math/math.h>
 
 #include <CLI/CLI.hpp>
@@ -43,6 +43,8 @@ Command meshLodCommand(CLI::App& app);
 
 /// Adds --adapter and --api: where to compute.
 void addDevice(CLI::App& app, std::string& adapter, std::string& api);
+/// A device of which only the validation layer's messages are printed: errors are returned too, and one line is enough.
+glint::Device openDevice(glint::DeviceDesc desc);
 /// Adds an option of three numbers: X,Y,Z.
 CLI::Option* addVector(CLI::App& app, const std::string& flag, glint::Vector3f& value, const std::string& help);
 /// Adds --tracing auto|driver|software: the engine for ray tracing.

@@ -61,7 +61,7 @@ struct MutationLimit {
 };
 constexpr MutationLimit mutation_limits[] = {{"memory barriers", 0.2},         {"source stages", 0.3},
                                              {"destination stages", 0.25},     {"transitions", 0.01},
-                                             {"sources of transitions", 0.05}, {"waits", 0.1}};
+                                             {"sources of transitions", 0.03}, {"waits", 0.1}};
 
 /// Takes one thing away at random; false if there is nothing of the kind.
 bool mutate(Mutant& mutant, Mutation mutation, Random& random) {

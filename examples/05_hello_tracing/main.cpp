@@ -1,6 +1,6 @@
 // Ray queries over 4,608 instances whose places change in every frame, from a compute or from a fragment shader.
 
-#include "05_hello_tracing/scene.h"
+#include "common/instanced_scene.h"
 #include "common/viewer.h"
 
 #include <glint/graphics/mesh_model.h>

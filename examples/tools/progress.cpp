@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -16,13 +17,34 @@ namespace tool {
 namespace {
 
 volatile std::sig_atomic_t interrupted = 0;
+timespec first_signal = {};
+
+// Programs like timeout(1) send the same signal to a process and to its group: what comes right after the first is no
+// second wish.
+void onSignal(int signal) {
+    timespec time;
+    ::clock_gettime(CLOCK_MONOTONIC, &time);
+    if (!interrupted) {
+        first_signal = time;
+        interrupted = 1;
+        return;
+    }
+    const auto seconds = static_cast<double>(time.tv_sec - first_signal.tv_sec) +
+                         1e-9 * static_cast<double>(time.tv_nsec - first_signal.tv_nsec);
+    if (seconds < 0.25) return;
+    ::signal(signal, SIG_DFL);
+    ::raise(signal);
+}
 
 }  // namespace
 
 void catchSignals() {
     struct sigaction action = {};
-    action.sa_handler = [](int) { interrupted = 1; };
-    action.sa_flags = static_cast<int>(SA_RESETHAND | SA_RESTART);
+    action.sa_handler = onSignal;
+    action.sa_flags = SA_RESTART;
+    // One handler at a time.
+    ::sigaddset(&action.sa_mask, SIGINT);
+    ::sigaddset(&action.sa_mask, SIGTERM);
     ::sigaction(SIGINT, &action, nullptr);
     ::sigaction(SIGTERM, &action, nullptr);
 }

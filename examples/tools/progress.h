@@ -9,7 +9,8 @@
 
 namespace tool {
 
-/// From here on SIGINT and SIGTERM only say that they came; a second one ends the program as ever.
+/// From here on SIGINT and SIGTERM only say that they came; a second one, a quarter of a second later or more, ends the
+/// program as ever.
 void catchSignals();
 /// "tool.interrupted" once a signal came. `rest`: what became of the work.
 glint::Status checkInterrupt(const char* rest = "nothing is left behind");

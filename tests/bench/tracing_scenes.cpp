@@ -1,6 +1,6 @@
 #include "bench/tracing_scenes.h"
 
-#include "05_hello_tracing/scene.h"
+#include "common/instanced_scene.h"
 #include "accuracy/embree.h"
 #include "support/reference.h"
 

@@ -1,6 +1,6 @@
 // The pictures of 05_hello_tracing against a float64 rendering of its scene.
 
-#include "05_hello_tracing/scene.h"
+#include "common/instanced_scene.h"
 #include "golden/render.h"
 #include "support/image_compare.h"
 #include "support/instanced_reference.h"

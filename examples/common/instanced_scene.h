@@ -1,6 +1,6 @@
 #pragma once
 
-// The scene of the tutorial in numbers, apart from how it is drawn: tests and benchmarks use it too.
+// The scene of 03, 04 and 05 in numbers, apart from how it is drawn: tests and benchmarks use it too.
 
 #include "common/torus.h"
 

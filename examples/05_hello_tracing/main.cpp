@@ -1,5 +1,6 @@
 // Ray queries over 4,608 instances whose places change in every frame, from a compute or from a fragment shader.
 
+#include "common/instance_ids.h"
 #include "common/instanced_scene.h"
 #include "common/viewer.h"
 
@@ -32,6 +33,7 @@ int main(int argc, char** argv) {
     example.add("--mesh", mesh_path, "Mesh to show (.obj, .ply, .gltf, .glb); a torus without it");
     example.add("--single", is_single, "Show one instance, from near");
     example.addKnob("--fragment", use_fragment, "Trace in a fragment shader instead of a compute shader");
+    InstanceIds ids(example);
     if (!example.parse(argc, argv)) return example.exitCode();
 
     const Expected<InstancedScene> places = InstancedScene::load(mesh_path, is_single);
@@ -62,8 +64,9 @@ int main(int argc, char** argv) {
     Pipeline pipeline = device.createPipeline("trace");
     pipeline.setColorFormat(FormatRGBAu8n);
     pipeline.loadShaderGLSL(Shader::TypeVertex, EXAMPLE_DIR "/main.shader", "VERTEX_SHADER=1");
-    pipeline.loadShaderGLSL(Shader::TypeFragment, EXAMPLE_DIR "/main.shader", "FRAGMENT_SHADER=1");
-    kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader", "COMPUTE_SHADER=1");
+    pipeline.loadShaderGLSL(Shader::TypeFragment, EXAMPLE_DIR "/main.shader",
+                            std::string("FRAGMENT_SHADER=1") + ids.macro());
+    kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader", std::string("COMPUTE_SHADER=1") + ids.macro());
 
     Statistics& statistics = example.statistics();
     const uint64_t tracing_bytes = triangles.getMemory() + scene.getMemory();
@@ -85,12 +88,14 @@ int main(int argc, char** argv) {
         compute.buildTracing(scene, scratch);
         frame.timer.end(compute);
 
+        ids.begin(device, frame.width, frame.height);
         Camera camera = places->camera(time, frame.aspect());
         camera.lookAt(frame.view.eye(camera.position(), places->target()), places->target());
         const auto bind = [&](Recorder& recorder) {
             recorder.setUniform(
                 0, Parameters{camera.parameters(), {frame.width, frame.height}, InstancedScene::split(time)});
             recorder.setStorageBuffers(0, {model.getVertexBuffer(), model.getIndexBuffer()});
+            if (ids.isWanted()) recorder.setStorageBuffer(2, ids.buffer());
             recorder.setTracing(0, scene);
         };
         if (use_fragment) {
@@ -114,6 +119,7 @@ int main(int argc, char** argv) {
         return device.submit(compute);
     });
     if (!status) return report(status.error());
+    if (Status saved = ids.save(device); !saved) return report(saved.error());
 
     statistics.setRays("trace", 1ull * statistics.width * statistics.height);
     std::printf("%zu instances of %llu triangles\n", instances.size(),

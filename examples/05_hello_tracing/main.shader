@@ -21,6 +21,9 @@ layout(set = 0, binding = 0) uniform Parameters {
 // A position and a normal each.
 layout(std430, set = 0, binding = 1) readonly buffer Vertices { float vertices[]; };
 layout(std430, set = 0, binding = 2) readonly buffer Indices { uint indices[]; };
+#if INSTANCE_IDS
+layout(std430, set = 0, binding = 3) writeonly buffer Ids { uint ids[]; };  // of each pixel
+#endif
 
 layout(set = 1, binding = 0) uniform accelerationStructureEXT scene;
 
@@ -44,6 +47,11 @@ bool trace(vec2 pixel, out vec3 color) {
     while (rayQueryProceedEXT(query)) {}
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT) return false;
 
+    uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
+#if INSTANCE_IDS
+    ids[uint(pixel.y) * uint(size.x) + uint(pixel.x)] = instance;
+#endif
+
     uint corner = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true)) * 3u;
     vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, true);
     vec3 object_normal = vertexNormal(corner) * (1.0 - uv.x - uv.y) + vertexNormal(corner + 1u) * uv.x +
@@ -55,8 +63,7 @@ bool trace(vec2 pixel, out vec3 color) {
     float diffuse = max(-dot(normal, direction), 0.0);
     float specular = pow(max(2.0 * diffuse * diffuse - 1.0, 0.0), 16.0);
     color = vec3(0.75);
-    if (pixel.x + 0.5 > size.x * split)
-        color = instanceColor(uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true)));
+    if (pixel.x + 0.5 > size.x * split) color = instanceColor(instance);
     color = color * diffuse + 0.25 * specular;
     return true;
 }

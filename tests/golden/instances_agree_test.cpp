@@ -1,0 +1,117 @@
+// 03, 04 and 05 show the same scene by the driver's pipeline, by compute shaders and by rays: each pixel has to show
+// the same instance, except within a pixel of an edge.
+
+#include "common/instanced_scene.h"
+#include "golden/render.h"
+#include "support/instance_compare.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+namespace glint::test {
+
+namespace {
+
+constexpr uint32_t width = 320, height = 180;
+
+InstancePicture instancesOf(const std::string& program, const std::string& arguments) {
+    const TempDir folder;
+    const std::filesystem::path path = folder / "ids.npy";
+    const Expected<Image> image = renderExample(
+        program, fmt::format("--size {}x{} --ids '{}' {}", width, height, path.string(), arguments), folder);
+    EXPECT_TRUE(image);
+    const Expected<InstancePicture> picture = InstancePicture::load(path);
+    EXPECT_TRUE(picture) << picture.error().text();
+    return picture.value_or(InstancePicture());
+}
+
+struct Way {
+    const char* program;
+    const char* arguments;
+    double pixels;  ///< by how much it may move an edge
+};
+
+const Way ways[] = {{"05_hello_tracing", " --fragment", 0.0}};
+
+class InstancesAgree : public ::testing::TestWithParam<const char*> {};
+
+}  // namespace
+
+TEST_P(InstancesAgree, ExceptWithinAPixelOfAnEdge) {
+    const std::string time = std::string(" --time ") + GetParam();
+    const InstancePicture traced = instancesOf("05_hello_tracing", time);
+    ASSERT_EQ(traced.width, width);
+    const Expected<InstancedScene> scene = InstancedScene::load({}, false);
+    ASSERT_TRUE(scene) << scene.error().text();
+    const float moment = std::stof(GetParam());
+    const InstanceJudge judge(scene->mesh(), scene->transforms(moment),
+                              scene->camera(moment, float(width) / height).parameters(), width, height);
+    for (const Way& way : ways) {
+        SCOPED_TRACE(std::string(way.program) + way.arguments);
+        const InstancePicture picture = instancesOf(way.program, time + way.arguments);
+        ASSERT_EQ(picture.width, width);
+        ASSERT_EQ(picture.height, height);
+        const InstanceDifferences found = compareInstances(traced, picture);
+        uint32_t unseen = 0;
+        for (const auto* pixels : {&found.near_both_pixels, &found.other_pixels})
+            for (const Vector2u& at : *pixels)
+                unseen += judge.isSeen(picture.at(at.x, at.y), at, 1.0 + way.pixels) ? 0 : 1;
+        fmt::print(
+            "{}{}{}: {} of {} pixels differ, {} near an edge in both pictures, {} in one, {} in neither; {} show "
+            "what no ray that near meets\n",
+            way.program, way.arguments, time, found.count(), found.pixels, found.near_both, found.near_one,
+            found.elsewhere, unseen);
+        EXPECT_EQ(found.elsewhere, 0u);
+    }
+}
+
+INSTANTIATE_TEST_SUITE_P(Times, InstancesAgree, ::testing::Values("3.14159", "8"));
+
+TEST(InstancesAgreeTest, TellsEdgesFromTheRest) {
+    // Two halves, and the same with the border moved, a stray pixel, and an instance that is not there at all.
+    const auto halves = [](uint32_t border) {
+        InstancePicture picture{.width = 12, .height = 6, .instances = {}};
+        for (uint32_t i = 0; i < 72; i++) picture.instances.push_back(i % 12 < border ? 7 : InstancePicture::none);
+        return picture;
+    };
+    const InstancePicture a = halves(4);
+    EXPECT_EQ(compareInstances(a, a).count(), 0u);
+    EXPECT_EQ(compareInstances(a, a).edge_pixels, 12u);
+    const InstanceDifferences moved = compareInstances(a, halves(5));
+    EXPECT_EQ(moved.near_both, 6u);
+    EXPECT_EQ(moved.count(), 6u);
+    // Columns 4 and 7 of eight-wide differences are near the edge in one of the two.
+    const InstanceDifferences far = compareInstances(a, halves(8));
+    EXPECT_EQ(far.near_both, 0u);
+    EXPECT_EQ(far.near_one, 12u);
+    EXPECT_EQ(far.elsewhere, 12u);
+    InstancePicture stray = a;
+    stray.instances[2 * 12 + 9] = 3;
+    const InstanceDifferences found = compareInstances(a, stray);
+    EXPECT_EQ(found.near_one, 1u);
+    EXPECT_EQ(found.count(), 1u);
+    ASSERT_EQ(found.other_pixels.size(), 1u);
+    EXPECT_EQ(found.other_pixels[0], Vector2u(9, 2));
+}
+
+TEST(InstancesAgreeTest, JudgesByRays) {
+    const Mesh mesh = createTorus(1.0f, 0.4f, 64, 32);  // around Z
+    const Transform3x4 still;
+    const Camera camera = Camera().lookAt({0.0f, 0.0f, 5.0f}, {}, {0, 1, 0}).perspective(60.0f, 1.0f);
+    const InstanceJudge judge(mesh, std::span(&still, 1), camera.parameters(), 64, 64);
+    // From above, at a distance of 5, the hole of radius 0.6 has 32 / tan(30 degrees) * 0.6 / 5 = 6.65 pixels, or 0.03
+    // less, as the narrowest that is seen lies deeper.
+    EXPECT_EQ(judge.at({32.0, 32.0}), InstancePicture::none);
+    EXPECT_EQ(judge.at({32.0 + 11.0, 32.0}), 0u);
+    EXPECT_EQ(judge.at({32.0 + 6.4, 32.0}), InstancePicture::none);
+    EXPECT_EQ(judge.at({32.0 + 6.8, 32.0}), 0u);
+    // The pixel's centre is at (4.5, 0.5) from the middle, so (5.5, 1.5) and (6.375, 2.375) are the farthest places.
+    EXPECT_TRUE(judge.isSeen(0, {36, 32}, 1.9));
+    EXPECT_FALSE(judge.isSeen(0, {36, 32}, 1.0));
+    EXPECT_TRUE(judge.isSeen(InstancePicture::none, {36, 32}, 0.0));
+    EXPECT_FALSE(judge.isSeen(3, {36, 32}, 0.5));
+}
+
+}  // namespace glint::test

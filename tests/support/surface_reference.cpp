@@ -8,10 +8,8 @@
 
 namespace glint::test {
 
-namespace {
-
-/// The nearest point, with the regions of Ericson 2005, section 5.1.5.
-Vector3d nearestOn(const std::array<Vector3d, 3>& triangle, const Vector3d& p) {
+// With the regions of Ericson 2005, section 5.1.5.
+Vector3d nearestOnTriangle(const std::array<Vector3d, 3>& triangle, const Vector3d& p) {
     const auto& [a, b, c] = triangle;
     const Vector3d ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
     const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap), d3 = glm::dot(ab, bp);
@@ -27,6 +25,8 @@ Vector3d nearestOn(const std::array<Vector3d, 3>& triangle, const Vector3d& p) {
     return a + ab * (vb / sum) + ac * (vc / sum);
 }
 
+namespace {
+
 std::array<Vector3d, 3> cornersOf(const Mesh& mesh, size_t triangle) {
     return {Vector3d(mesh.positions[mesh.indices[triangle * 3]]),
             Vector3d(mesh.positions[mesh.indices[triangle * 3 + 1]]),
@@ -36,7 +36,7 @@ std::array<Vector3d, 3> cornersOf(const Mesh& mesh, size_t triangle) {
 }  // namespace
 
 double distanceToTriangle(const std::array<Vector3d, 3>& triangle, const Vector3d& point) {
-    return glm::distance(nearestOn(triangle, point), point);
+    return glm::distance(nearestOnTriangle(triangle, point), point);
 }
 
 NearestReference::NearestReference(const Mesh& mesh) {
@@ -56,7 +56,7 @@ Vector3d NearestReference::nearest(const Vector3d& point) const {
         const Vector3d away = item.center - point;
         const double reach = best + item.radius;
         if (glm::dot(away, away) > reach * reach) continue;
-        const Vector3d candidate = nearestOn(item.corners, point);
+        const Vector3d candidate = nearestOnTriangle(item.corners, point);
         const double distance = glm::distance(candidate, point);
         if (distance < best) {
             best = distance;

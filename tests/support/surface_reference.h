@@ -11,7 +11,9 @@
 
 namespace glint::test {
 
-/// Distance of a point to a triangle, by the region of the triangle's plane that it projects to.
+/// The point of a triangle nearest to a point, by the region of the triangle's plane that it projects to.
+Vector3d nearestOnTriangle(const std::array<Vector3d, 3>& triangle, const Vector3d& point);
+/// The distance to it.
 double distanceToTriangle(const std::array<Vector3d, 3>& triangle, const Vector3d& point);
 
 /// Nearest points of a mesh, by looking at every triangle that may be nearer.

@@ -1,13 +1,13 @@
 // Graphs of levels of detail: no crack, no error beyond the bound, no cluster outside of what encloses it.
 
 #include "support/files.h"
+#include "support/hard_meshes.h"
 #include "support/matchers.h"
 #include "support/reference.h"
 #include "support/surface_reference.h"
 
 #include <glint/geometry/mesh_graph_builder.h>
 #include <glint/geometry/primitives.h>
-#include <glint/geometry/refine.h>
 
 #include <glm/geometric.hpp>
 #include <gtest/gtest.h>
@@ -22,73 +22,9 @@ using namespace glint::test;
 
 namespace {
 
-/// The torus of the tutorials; 3 steps are 22,528 triangles.
+/// 22,528 triangles.
 const Mesh& torus() {
-    static const Mesh mesh =
-        *toTriangles(*refine(createTorusQuads(1.07208f, 0.77792f, 16, 11), Subdivision::CatmullClark, 3));
-    return mesh;
-}
-
-/// Open, with a hole, with texture coordinates that are torn along a line.
-Mesh sheet() {
-    Mesh mesh = createPlane(4.0f, 60);
-    for (Vector3f& p : mesh.positions) p.z = 0.2f * std::sin(3.0f * p.x) * std::cos(2.0f * p.y);
-    mesh.createNormals();
-    Mesh torn = mesh;
-    torn.indices.clear();
-    for (size_t i = 0; i < mesh.indices.size(); i += 3) {
-        Vector3f center(0.0f);
-        for (size_t k = 0; k < 3; k++) center += mesh.positions[mesh.indices[i + k]] / 3.0f;
-        if (glm::length(center - Vector3f(0.7f, 0.4f, center.z)) < 0.5f) continue;
-        for (size_t k = 0; k < 3; k++) {
-            uint32_t vertex = mesh.indices[i + k];
-            if (center.x > 0.0f && mesh.positions[vertex].x == 0.0f) {
-                torn.positions.push_back(mesh.positions[vertex]);
-                torn.normals.push_back(mesh.normals[vertex]);
-                torn.texcoords.push_back(mesh.texcoords[vertex] + 0.5f);
-                vertex = static_cast<uint32_t>(torn.positions.size()) - 1;
-            }
-            torn.indices.push_back(vertex);
-        }
-    }
-    return torn;
-}
-
-/// Two parts that share a border.
-Mesh halves() {
-    Mesh mesh = createTorus(2.0f, 0.7f, 60, 40);
-    const auto half = static_cast<uint32_t>(mesh.indices.size() / 6 * 3);
-    mesh.parts = {{"left", 0, half, 3}, {"right", half, static_cast<uint32_t>(mesh.indices.size()) - half, 5}};
-    return mesh;
-}
-
-/// Random triangles between few points: edges of many triangles, repeated and degenerate ones, fans that touch.
-Mesh soup(uint64_t seed, size_t points, size_t triangles) {
-    Random random(seed);
-    Mesh mesh;
-    for (size_t i = 0; i < points; i++) mesh.positions.emplace_back(random.direction());
-    for (size_t i = 0; i < 3 * triangles; i++) mesh.indices.push_back(static_cast<uint32_t>(random.below(points)));
-    return mesh;
-}
-
-/// A torus with a fin on every 8th edge, a repeated triangle here and there, and cones that touch it at their tips.
-Mesh nonManifold() {
-    Mesh mesh = createTorus(2.0f, 0.7f, 60, 40);
-    const std::vector<uint32_t> indices = mesh.indices;
-    for (size_t i = 0; i < indices.size(); i += 24) {
-        const uint32_t a = indices[i], b = indices[i + 1];
-        mesh.positions.push_back(mesh.positions[a] * 1.2f);
-        const auto tip = static_cast<uint32_t>(mesh.positions.size()) - 1;
-        mesh.indices.insert(mesh.indices.end(), {a, b, tip});
-        if (i % 96 == 0) mesh.indices.insert(mesh.indices.end(), {indices[i], indices[i + 1], indices[i + 2]});
-        if (i % 120 != 0) continue;
-        const auto first = static_cast<uint32_t>(mesh.positions.size());
-        for (int k = 0; k < 3; k++)
-            mesh.positions.push_back(mesh.positions[indices[i + 2]] * 1.1f + 0.05f * Vector3f(k == 0, k == 1, k == 2));
-        for (uint32_t k = 0; k < 3; k++)
-            mesh.indices.insert(mesh.indices.end(), {indices[i + 2], first + k, first + (k + 1) % 3});
-    }
-    mesh.normals.clear();
+    static const Mesh mesh = tutorialTorus(3);
     return mesh;
 }
 
@@ -107,23 +43,12 @@ const std::vector<Case>& cases() {
             if (graph) all.push_back({name, std::move(mesh), *graph});
         };
         add("torus", torus());
-        add("sheet", sheet());
-        add("two parts", halves());
+        add("sheet", tornSheet());
+        add("two parts", twoParts());
         add("not manifold", nonManifold());
         add("soup", soup(5, 300, 4000));
         add("box", createBox({1, 2, 3}));
-        add("spheres", [] {
-            Mesh mesh;
-            Random random(9);
-            for (int i = 0; i < 60; i++) {
-                const Mesh sphere = createSphere(0.3f, 2);
-                const auto first = static_cast<uint32_t>(mesh.positions.size());
-                const Vector3f offset(4.0 * random.direction());
-                for (const Vector3f& p : sphere.positions) mesh.positions.push_back(p + offset);
-                for (const uint32_t index : sphere.indices) mesh.indices.push_back(first + index);
-            }
-            return mesh;
-        }());
+        add("spheres", spheres());
         return all;
     }();
     return list;
@@ -408,7 +333,7 @@ TEST(MeshGraph, TheSameWithAnyNumberOfThreads) {
 }
 
 TEST(MeshGraph, KeepsAttributesAndParts) {
-    const Mesh mesh = halves();
+    const Mesh mesh = twoParts();
     const MeshGraph graph = *createMeshGraph(mesh);
     const std::vector<MeshGraphPart> parts = {{"left", 3}, {"right", 5}};
     EXPECT_EQ(graph.parts(), parts);
@@ -423,7 +348,7 @@ TEST(MeshGraph, KeepsAttributesAndParts) {
         for (size_t i = 0; i < shown.positions.size(); i++)
             ASSERT_EQ(shown.normals[i], (normals[{shown.positions[i].x, shown.positions[i].y, shown.positions[i].z}]));
     }
-    const MeshGraph torn = *createMeshGraph(sheet());
+    const MeshGraph torn = *createMeshGraph(tornSheet());
     EXPECT_EQ(torn.texcoords().size(), torn.positions().size());
     EXPECT_EQ(torn.normals().size(), torn.positions().size());
 }

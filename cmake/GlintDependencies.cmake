@@ -18,7 +18,7 @@ find_package(PNG REQUIRED)
 find_package(tinyobjloader CONFIG REQUIRED)
 find_package(TinyGLTF CONFIG REQUIRED)
 find_package(meshoptimizer CONFIG REQUIRED)
-# Compiled against, and opened when it is needed: see core/format/assimp.cpp.
+# Compiled against, and opened when it is needed: see examples/tools/import_mesh.cpp.
 find_package(assimp CONFIG REQUIRED)
 add_library(glint_assimp INTERFACE)
 get_target_property(include assimp::assimp INTERFACE_INCLUDE_DIRECTORIES)

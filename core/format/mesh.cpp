@@ -2,7 +2,6 @@
 
 #include <glint/base/file.h>
 #include <glint/base/format_error.h>
-#include <glint/format/detail/assimp.h>
 #include <glint/format/scene.h>
 
 #include <glm/geometric.hpp>
@@ -48,11 +47,8 @@ Expected<Mesh> Mesh::load(const std::filesystem::path& path, uint64_t limit) {
         return unexpected(
             Error::inFile(mesh.error().code(), mesh.error().id().data(), mesh.error().message(), name, 0));
     }
-    for (const std::string_view other : detail::assimp_extensions)
-        if (kind == other) return detail::readThroughAssimp(path, limit);
-    std::string known = ".obj, .ply, .gltf, .glb";
-    for (const std::string_view other : detail::assimp_extensions) known += fmt::format(", {}", other);
-    return unexpected(unknownExtension(path, known.c_str()));
+    return unexpected(
+        unknownExtension(path, ".obj, .ply, .gltf, .glb (and `glint mesh convert` reads more, to write .ply)"));
 }
 
 Status Mesh::save(const std::filesystem::path& path) const {

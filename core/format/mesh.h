@@ -41,11 +41,7 @@ struct Mesh {
     /// order of the file. Errors: those of readFile, "mesh.unknown_extension" and those of the format; they name the
     /// file and the line or the element.
     ///
-    /// What docs/formats.md lists besides is read by assimp, if its library is installed: at rest, polygons split into
-    /// triangles, equal vertices joined, a part for each of the file's meshes. The library runs in a process of its own
-    /// (fork), which may end as it likes: in four seconds and one for each 100 kB of the file, or in 1 GiB and twice
-    /// the limit. Errors: "mesh.library" (not installed, or of another version), "mesh.assimp" (it cannot read the
-    /// file).
+    /// `glint mesh convert` makes PLY of the other formats that docs/formats.md lists.
     static Expected<Mesh> load(const std::filesystem::path& path, uint64_t limit = default_limit);
 
     /// Writes a file, as its ending says (".ply", see encodePly). Errors: those of writeFile, "mesh.unknown_extension"

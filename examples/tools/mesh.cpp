@@ -1,6 +1,7 @@
 // glint mesh: looks at meshes, converts, refines, simplifies and orders them, and makes levels of detail. Its
 // subcommands that are longer have a source of their own.
 
+#include "import_mesh.h"
 #include "tool.h"
 
 #include <glint/format/mesh_graph.h>
@@ -36,7 +37,7 @@ struct ConvertOptions {
 };
 
 Expected<Mesh> loadMesh(const std::filesystem::path& path, float error) {
-    if (path.extension() != ".lod") return Mesh::load(path);
+    if (path.extension() != ".lod") return importMesh(path);
     const Expected<MeshGraph> graph = MeshGraph::load(path);
     if (!graph) return unexpected(graph.error());
     return graph->mesh(graph->cut(error));
@@ -77,7 +78,7 @@ struct RefineOptions {
 };
 
 int runRefine(const RefineOptions& options) {
-    const Expected<Mesh> mesh = Mesh::load(options.from);
+    const Expected<Mesh> mesh = importMesh(options.from);
     if (!mesh) return fail("mesh refine", mesh.error());
     const Expected<PolygonMesh> cage = toPolygons(*mesh);
     if (!cage) return fail("mesh refine", cage.error());
@@ -120,7 +121,7 @@ void print(const char* name, const Mesh& mesh) {
 }
 
 int runOptimize(const OptimizeOptions& options) {
-    Expected<Mesh> mesh = Mesh::load(options.from);
+    Expected<Mesh> mesh = importMesh(options.from);
     if (!mesh) return fail("mesh optimize", mesh.error());
     print("before", *mesh);
     options.positions ? weldPositions(*mesh) : weld(*mesh);

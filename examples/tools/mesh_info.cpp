@@ -1,5 +1,6 @@
 // glint mesh info: what a file holds, and what is wrong with it.
 
+#include "import_mesh.h"
 #include "tool.h"
 
 #include <glint/format/mesh_graph.h>
@@ -131,13 +132,13 @@ int run(const Options& options) {
         description = describe(*graph);
         mesh = graph->mesh(graph->cut(0.0f));
     } else {
-        Expected<Mesh> loaded = Mesh::load(options.mesh);
+        Expected<Mesh> loaded = importMesh(options.mesh);
         if (!loaded) return fail("mesh info", loaded.error());
         mesh = std::move(*loaded);
         description = describe(mesh);
     }
     if (!options.against.empty()) {
-        const Expected<Mesh> other = Mesh::load(options.against);
+        const Expected<Mesh> other = importMesh(options.against);
         if (!other) return fail("mesh info", other.error());
         const SurfaceDistance distance = hausdorffDistance(mesh, *other);
         description["distance"] = {{"least", distance.lower}, {"most", distance.upper}};

@@ -1,5 +1,6 @@
 // glint mesh lod: a graph of clusters at many levels of detail.
 
+#include "import_mesh.h"
 #include "progress.h"
 #include "tool.h"
 
@@ -32,7 +33,7 @@ int failOrInterrupted(const Error& error) {
 
 int run(Options& options) {
     catchSignals();
-    Expected<Mesh> mesh = Mesh::load(options.from);
+    Expected<Mesh> mesh = importMesh(options.from);
     if (!mesh) return failOrInterrupted(mesh.error());
     options.positions ? weldPositions(*mesh) : weld(*mesh);
     if (options.positions && !mesh->indices.empty()) mesh->createNormals();

@@ -56,6 +56,19 @@ TEST_F(MeshTool, ConvertRefineOptimize) {
     EXPECT_LE(hausdorffDistance(simple, torus).lower, 0.02);
 }
 
+// In every format that is read, by all subcommands.
+TEST_F(MeshTool, Imports) {
+    GLINT_NEED_ASSIMP_MODELS();
+    const std::string duck = assimpModelPath("Collada/duck.dae").string();
+    if (run("mesh info " + duck).errors.ends_with("[tool.library]\n")) GTEST_SKIP() << "needs assimp's library";
+    EXPECT_EQ(info(duck)["triangles"], 4212);
+    expectSuccess("mesh convert " + duck + " duck.ply --weld");
+    EXPECT_GT(Mesh::load(dir / "duck.ply")->triangleCount(), 4000u);
+    expectSuccess("mesh lod " + duck + " duck.lod --positions");
+    write("damaged.fbx", "nothing of that kind");
+    expectFailure("mesh info damaged.fbx", 2, "tool.import");
+}
+
 TEST_F(MeshTool, LevelsOfDetail) {
     expectSuccess("mesh lod torus.ply torus.lod --threads 2");
     const Expected<MeshGraph> graph = MeshGraph::load(dir / "torus.lod");

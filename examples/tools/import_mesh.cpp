@@ -1,10 +1,11 @@
-// Formats that have no smaller library. assimp is opened when the first such file is read: linking it would make every
-// program load 10 MB of library and its dependencies.
+// Formats that have no smaller library. assimp is opened when such a file is read: linked, its 10 MB and their
+// dependencies would be loaded by every run of the tool.
 
-#include <glint/format/detail/assimp.h>
+#include "import_mesh.h"
 
 #include <glint/base/file.h>
-#include <glint/base/format_error.h>
+
+#include <fmt/format.h>
 
 #include <assimp/cimport.h>
 #include <assimp/config.h>
@@ -15,11 +16,14 @@
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cmath>
 #include <csignal>
@@ -27,7 +31,9 @@
 #include <cstring>
 #include <span>
 
-namespace glint::detail {
+using namespace glint;
+
+namespace tool {
 
 namespace {
 
@@ -88,9 +94,9 @@ Expected<Mesh> collect(const aiScene& scene, uint64_t limit) {
         has_texcoords = has_texcoords && from.mTextureCoords[0];
     }
     if (vertices * 32 + triangles * 12 > limit || vertices > UINT32_MAX || triangles * 3 > UINT32_MAX)
-        return unexpected(makeError(ErrorCode::OutOfRange, "mesh.too_large",
-                                    "{} vertices and {} triangles take more than the limit of {} bytes", vertices,
-                                    triangles, limit));
+        return unexpected(Error(ErrorCode::OutOfRange, "mesh.too_large",
+                                fmt::format("{} vertices and {} triangles take more than the limit of {} bytes",
+                                            vertices, triangles, limit)));
     for (uint32_t i = 0; i < scene.mNumMeshes; i++) {
         const aiMesh& from = *scene.mMeshes[i];
         const auto first = static_cast<uint32_t>(mesh.positions.size());
@@ -207,17 +213,17 @@ bool receive(Channel& channel, Mesh& mesh) {
     return true;
 }
 
-// Sanitizers reserve terabytes of addresses at any time.
+// Sanitizers reserve terabytes of addresses at any time, and may have a thread of their own.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool limits_memory = false;
+constexpr bool is_sanitized = true;
 #elif defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-constexpr bool limits_memory = false;
+constexpr bool is_sanitized = true;
 #else
-constexpr bool limits_memory = true;
+constexpr bool is_sanitized = false;
 #endif
 #else
-constexpr bool limits_memory = true;
+constexpr bool is_sanitized = false;
 #endif
 
 /// Exit statuses of the child.
@@ -252,59 +258,83 @@ uint64_t addressSpace() {
     return place == std::string::npos ? 0 : std::strtoull(text->c_str() + place + 7, nullptr, 10) * 1024;
 }
 
+/// Threads that this process has.
+size_t threadCount() {
+    std::error_code error;
+    const std::filesystem::directory_iterator tasks("/proc/self/task", error);
+    return error ? 1 : static_cast<size_t>(std::distance(begin(tasks), end(tasks)));
+}
+
 }  // namespace
 
-Expected<Mesh> readThroughAssimp(const std::filesystem::path& path, uint64_t limit) {
+Expected<Mesh> importMesh(const std::filesystem::path& path, uint64_t limit) {
+    std::string kind = path.extension().string();
+    for (char& c : kind) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    if (std::ranges::find(import_extensions, kind) == std::end(import_extensions)) return Mesh::load(path, limit);
+
     const Expected<InputFile> file = InputFile::open(path);
     if (!file) return unexpected(file.error());
-    if (file->size() > limit)
-        return unexpected(makeError(ErrorCode::Io, "file.too_large", "'{}' has {} bytes, the limit is {}",
-                                    path.string(), file->size(), limit));
     const std::string name = path.filename().string();
     const auto fail = [&](ErrorCode code, const char* id, const std::string& text) {
         return unexpected(Error::inFile(code, id, text, name, 0));
     };
+    if (file->size() > limit)
+        return fail(ErrorCode::Io, "file.too_large", fmt::format("{} bytes, the limit is {}", file->size(), limit));
     const Library& assimp = library();
-    if (!assimp.reason.empty()) return fail(ErrorCode::Unsupported, "mesh.library", assimp.reason);
+    if (!assimp.reason.empty()) return fail(ErrorCode::Unsupported, "tool.library", assimp.reason);
+    // What other threads had locked would stay locked in the child.
+    if (!is_sanitized && threadCount() > 1)
+        return fail(ErrorCode::Internal, "tool.threads", fmt::format("read while there are {} threads", threadCount()));
 
     // Damaged files make the library crash, or take all memory or time: it does so in a process of its own.
     Channel channel;
     const uint64_t memory = addressSpace() + 2 * limit + (uint64_t{1} << 30);
     const uint64_t seconds = 4 + file->size() / 100'000;
+    // A status that nobody keeps could not be waited for.
+    std::signal(SIGCHLD, SIG_DFL);
+    std::fflush(nullptr);
     const pid_t child = channel.isOpen() ? ::fork() : -1;
     if (child < 0)
-        return fail(ErrorCode::OutOfMemory, "mesh.assimp",
+        return fail(ErrorCode::OutOfMemory, "tool.import",
                     fmt::format("no process to read it: {}", std::strerror(errno)));
     if (child == 0) {
-        if (limits_memory) setLimit(RLIMIT_AS, memory);
+        ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+        if (!is_sanitized) setLimit(RLIMIT_AS, memory);
         setLimit(RLIMIT_CPU, seconds);
         setLimit(RLIMIT_CORE, 0);
         const int nowhere = ::open("/dev/null", O_WRONLY);
-        if (nowhere >= 0) ::dup2(nowhere, STDERR_FILENO);
+        if (nowhere >= 0) {
+            ::dup2(nowhere, STDOUT_FILENO);
+            ::dup2(nowhere, STDERR_FILENO);
+        }
         ::_exit(import(assimp, path, limit, channel));
     }
     int status = 0;
-    while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {}
+    pid_t waited = -1;
+    while ((waited = ::waitpid(child, &status, 0)) < 0 && errno == EINTR) {}
+    if (waited < 0)
+        return fail(ErrorCode::Internal, "tool.import",
+                    fmt::format("it is not known how assimp ended: {}", std::strerror(errno)));
     if (WIFSIGNALED(status)) {
         const int signal = WTERMSIG(status);
         if (signal == SIGXCPU || signal == SIGKILL)
-            return fail(ErrorCode::InvalidArgument, "mesh.assimp",
+            return fail(ErrorCode::InvalidArgument, "tool.import",
                         fmt::format("assimp has taken longer than {} s of a processor, or too much memory", seconds));
-        return fail(ErrorCode::InvalidArgument, "mesh.assimp", fmt::format("assimp crashes: {}", ::strsignal(signal)));
+        return fail(ErrorCode::InvalidArgument, "tool.import", fmt::format("assimp crashes: {}", ::strsignal(signal)));
     }
     if (WEXITSTATUS(status) == Refused || WEXITSTATUS(status) == TooLarge) {
         std::vector<char> letters;
         channel.read(letters, channel.remaining());
         const std::string text(letters.begin(), letters.end());
         if (WEXITSTATUS(status) == TooLarge) return fail(ErrorCode::OutOfRange, "mesh.too_large", text);
-        return fail(ErrorCode::InvalidArgument, "mesh.assimp", text);
+        return fail(ErrorCode::InvalidArgument, "tool.import", text);
     }
     Mesh mesh;
     if (WEXITSTATUS(status) != Sent || !receive(channel, mesh))
-        return fail(ErrorCode::OutOfMemory, "mesh.assimp", "what assimp has read cannot be taken over");
+        return fail(ErrorCode::OutOfMemory, "tool.import", "what assimp has read cannot be taken over");
     if (Status valid = mesh.validate(); !valid)
         return fail(valid.error().code(), valid.error().id().data(), valid.error().message());
     return mesh;
 }
 
-}  // namespace glint::detail
+}  // namespace tool

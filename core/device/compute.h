@@ -49,9 +49,9 @@ public:
     /// All texels of the slice; depth in color.r, stencil in color.g.
     void clearTexture(const Texture& texture, const Color& color, const Slice& slice = {},
                       Where where = Where::current());
-    /// Fills the mip levels above 0, each from the one below by a blit with a linear filter: sizes that halve evenly
-    /// give the mean of four texels (in a volume of eight), sRGB in linear values, to one unit of the last place a
-    /// level; odd sizes are sampled at the centres of their texels (docs/drawing.md). Errors: "mipmaps.format".
+    /// Fills the mip levels above 0: each texel is the mean of what it covers of the level below, in float32 and linear
+    /// values, rounded only as it is stored; of an odd size the texels at the edges count in part (docs/drawing.md).
+    /// Tracked whatever setTracking says. Errors: "mipmaps.format".
     void createMipmaps(const Texture& texture, Where where = Where::current());
 
     /// Replaces the instances of a top-level structure; at most as many as it has room for.

@@ -111,7 +111,6 @@ const char* toString(CommandType type) {
         case CommandType::CopyTextureToBuffer: return "copy from texture";
         case CommandType::CopyTexture: return "copy of texture";
         case CommandType::ClearTexture: return "clear of texture";
-        case CommandType::BlitMipmap: return "fill of mip level";
         case CommandType::BuildTracings: return "build";
         case CommandType::CopyTracing: return "copy of structure";
         case CommandType::WriteTracingSize: return "size of structure";

@@ -99,14 +99,6 @@ public:
                 need(command.texture, Stage::Copy, AccessWrite, command.slice);
                 break;
             }
-            case CommandType::BlitMipmap: {
-                const auto& command = as<BlitMipmapCommand>();
-                Slice below = command.slice;
-                below.mip--;
-                need(command.texture, Stage::Copy, AccessRead, below);
-                need(command.texture, Stage::Copy, AccessWrite, command.slice);
-                break;
-            }
             case CommandType::BuildTracings: {
                 const auto& command = as<BuildTracingsCommand>();
                 for (uint32_t i = 0; i < command.count; i++) build(list_.at<TracingBuild>(command.builds)[i]);

@@ -125,7 +125,6 @@ void NullPlayer::play(const CommandHeader& header) {
         case CommandType::CopyTextureToBuffer: play(as<CopyBufferTextureCommand>(header)); break;
         case CommandType::CopyTexture: play(as<CopyTextureCommand>(header)); break;
         case CommandType::ClearTexture: play(as<ClearTextureCommand>(header)); break;
-        case CommandType::BlitMipmap: play(as<BlitMipmapCommand>(header)); break;
         case CommandType::BuildTracings: play(as<BuildTracingsCommand>(header)); break;
         case CommandType::CopyTracing: play(as<CopyTracingCommand>(header)); break;
         case CommandType::WriteTracingSize: play(as<WriteTracingSizeCommand>(header)); break;
@@ -240,24 +239,6 @@ void NullPlayer::play(const ClearTextureCommand& command) {
     ClearValue value;
     std::memcpy(&value, &command.value, sizeof(value));
     if (inRange(command.texture, command.slice, {})) clear(native<NullTexture>(command.texture), command.slice, value);
-}
-
-// Every other texel instead of an average: enough to see which level a test reads.
-void NullPlayer::play(const BlitMipmapCommand& command) {
-    if (command.slice.mip == 0 || !inRange(command.texture, command.slice, {})) return;
-    const auto& texture = native<NullTexture>(command.texture);
-    const uint32_t below = command.slice.mip - 1u;
-    const Grid from(texture, below);
-    const Grid to(texture, command.slice.mip);
-    for (uint32_t layer = command.slice.layer; layer < uint32_t(command.slice.layer) + command.slice.layers; layer++)
-        for (uint32_t z = 0; z < to.depth; z++)
-            for (uint32_t y = 0; y < to.height; y++)
-                for (uint32_t x = 0; x < to.width; x++)
-                    std::memcpy(texture.texels(command.slice.mip, layer) + to.offset(x, y, z),
-                                texture.texels(below, layer) + from.offset(std::min(2 * x, from.width - 1),
-                                                                           std::min(2 * y, from.height - 1),
-                                                                           std::min(2 * z, from.depth - 1)),
-                                to.texel);
 }
 
 void NullPlayer::play(const BuildTracingsCommand& command) {

@@ -166,7 +166,6 @@ void Player::playCommand(const CommandHeader& header) {
         case CommandType::CopyTextureToBuffer: return play(as<CopyBufferTextureCommand>(header));
         case CommandType::CopyTexture: return play(as<CopyTextureCommand>(header));
         case CommandType::ClearTexture: return play(as<ClearTextureCommand>(header));
-        case CommandType::BlitMipmap: return play(as<BlitMipmapCommand>(header));
         case CommandType::BuildTracings: return play(as<BuildTracingsCommand>(header));
         case CommandType::CopyTracing: return play(as<CopyTracingCommand>(header));
         case CommandType::WriteTracingSize: return play(as<WriteTracingSizeCommand>(header));

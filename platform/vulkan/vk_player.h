@@ -82,7 +82,6 @@ private:
     void play(const detail::CopyBufferTextureCommand& command);
     void play(const detail::CopyTextureCommand& command);
     void play(const detail::ClearTextureCommand& command);
-    void play(const detail::BlitMipmapCommand& command);
     void play(const detail::BuildTracingsCommand& command);
     void play(const detail::CopyTracingCommand& command);
     void play(const detail::WriteTracingSizeCommand& command);

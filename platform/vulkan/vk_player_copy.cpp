@@ -24,11 +24,6 @@ VkOffset3D offset(uint32_t x, uint32_t y, uint32_t z) {
     return {static_cast<int32_t>(x), static_cast<int32_t>(y), static_cast<int32_t>(z)};
 }
 
-/// The far corner of a mip level.
-VkOffset3D corner(const TextureDesc& desc, uint32_t mip) {
-    return offset(std::max(desc.width >> mip, 1u), std::max(desc.height >> mip, 1u), std::max(desc.depth >> mip, 1u));
-}
-
 }  // namespace
 
 VulkanTracing& Player::tracing(uint32_t resource) const {
@@ -92,20 +87,6 @@ void Player::play(const ClearTextureCommand& command) {
     VkClearColorValue value = {};
     std::copy(std::begin(command.value.u), std::end(command.value.u), value.uint32);
     vk_.CmdClearColorImage(commands_, image.handle(), VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, &value, 1, &range);
-}
-
-void Player::play(const BlitMipmapCommand& command) {
-    const VulkanTexture& image = texture(command.texture);
-    Slice below = command.slice;
-    below.mip--;
-    VkImageBlit blit = {};
-    blit.srcSubresource = layers(image.aspects(), below);
-    blit.srcOffsets[1] = corner(image.desc(), below.mip);
-    blit.dstSubresource = layers(image.aspects(), command.slice);
-    blit.dstOffsets[1] = corner(image.desc(), command.slice.mip);
-    vk_.CmdBlitImage(commands_, image.handle(), VK_IMAGE_LAYOUT_TRANSFER_SRC_OPTIMAL, image.handle(),
-                     VK_IMAGE_LAYOUT_TRANSFER_DST_OPTIMAL, 1, &blit,
-                     image.isFilterable() ? VK_FILTER_LINEAR : VK_FILTER_NEAREST);
 }
 
 void Player::play(const BuildTracingsCommand& command) {

@@ -61,9 +61,7 @@ uint32_t textureSupport(const VulkanDevice& device, Format format, Texture::Type
     if ((features & copies) != copies || !sampleCounts(device, format, type, 0, features)) return 0;
 
     uint32_t support = 0;
-    if (features & VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT) support |= supports_sampling;
-    constexpr VkFormatFeatureFlags blits = VK_FORMAT_FEATURE_BLIT_SRC_BIT | VK_FORMAT_FEATURE_BLIT_DST_BIT;
-    if ((features & blits) == blits) support |= Texture::FlagMipmaps;
+    if (features & VK_FORMAT_FEATURE_SAMPLED_IMAGE_BIT) support |= supports_sampling | Texture::FlagMipmaps;
     // GLSL has no image formats for depth, whatever a driver offers.
     if ((features & VK_FORMAT_FEATURE_STORAGE_IMAGE_BIT) && !info.depth &&
         sampleCounts(device, format, type, Texture::FlagSurface, features)) {
@@ -106,9 +104,7 @@ VulkanTexture::VulkanTexture(VulkanDevice& device, const TextureDesc& desc, uint
       desc_(desc),
       samples_(samples),
       format_(vulkanFormat(desc.format)),
-      aspects_(formatAspects(desc.format)),
-      is_filterable_((formatFeatures(device, desc.format) & VK_FORMAT_FEATURE_SAMPLED_IMAGE_FILTER_LINEAR_BIT) != 0 &&
-                     !formatInfo(desc.format).depth) {}
+      aspects_(formatAspects(desc.format)) {}
 
 Expected<std::unique_ptr<VulkanTexture>> VulkanTexture::create(VulkanDevice& device,
                                                                const detail::NativeTextureDesc& native) {

@@ -33,8 +33,6 @@ public:
     uint32_t samples() const { return samples_; }
     VkFormat format() const { return format_; }
     VkImageAspectFlags aspects() const { return aspects_; }
-    /// True if the format can be read with a linear filter.
-    bool isFilterable() const { return is_filterable_; }
 
     /// A view of a slice, made when first asked for. Under the submit lock.
     Expected<VkImageView> view(Slice slice, VkImageViewType type, VkImageAspectFlags aspects);
@@ -54,7 +52,6 @@ private:
     const uint32_t samples_;
     const VkFormat format_;
     const VkImageAspectFlags aspects_;
-    const bool is_filterable_;
     RawImage raw_;
     std::vector<View> views_;
 };

@@ -563,8 +563,8 @@ MISUSE(KernelOnTheCopyQueue, "recorder.queue") {
 MISUSE(ClearOnTheCopyQueue, "recorder.queue") {
     return kit.list([&](Compute& list) { list.clearTexture(kit.texture(), Color()); }, Queue::Copy);
 }
-MISUSE(MipmapsOnTheComputeQueue, "recorder.queue") {
-    return kit.list([&](Compute& list) { list.createMipmaps(kit.texture(Texture::FlagMipmaps)); }, Queue::Compute);
+MISUSE(MipmapsOnTheCopyQueue, "recorder.queue") {
+    return kit.list([&](Compute& list) { list.createMipmaps(kit.texture(Texture::FlagMipmaps)); }, Queue::Copy);
 }
 MISUSE(DepthClearedOnTheComputeQueue, "recorder.queue") {
     return kit.list(

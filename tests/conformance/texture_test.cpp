@@ -235,26 +235,6 @@ TEST_F(TextureShaderTest, MipmapsAverage) {
     EXPECT_NEAR(readTexture<float>(texture, {.mip = 3, .mips = 1})[0], 31.5f, 1e-4);
 }
 
-TEST_P(TextureTest, MipmapsOfCubesAndArraysAndVolumes) {
-    for (const Texture& texture :
-         {device.createTextureCube(FormatRGBAu8n, 8, Texture::FlagMipmaps),
-          device.createTexture(
-              {.format = FormatRGBAu8n, .width = 8, .height = 4, .layers = 3, .flags = Texture::FlagMipmaps}),
-          device.createTexture3D(FormatRGBAu8n, 8, 8, 8, Texture::FlagMipmaps)}) {
-        ASSERT_TRUE(texture);
-        const auto layers = static_cast<uint16_t>(texture.getLayers());
-        for (uint16_t layer = 0; layer < layers; layer++) {
-            const std::vector<uint8_t> data(texture.getDataSize(), static_cast<uint8_t>(10 + layer));
-            device.setTexture(texture, data.data(), data.size(), {0, 1, layer, 1});
-        }
-        device.createMipmaps(texture);
-        const auto last = static_cast<uint16_t>(texture.getMipmaps() - 1);
-        for (uint16_t layer = 0; layer < layers; layer++)
-            EXPECT_EQ(readTexture<uint8_t>(texture, {last, 1, layer, 1}),
-                      std::vector<uint8_t>(texture.getDataSize(last), static_cast<uint8_t>(10 + layer)));
-    }
-}
-
 TEST_F(TextureShaderTest, SurfacesOfEveryFormatThatCanBeOne) {
     struct Case {
         Format format;

@@ -430,7 +430,7 @@ TEST_F(HazardChecker, MipLevelsAreFilledOneFromTheOther) {
             made.barrier(0, 0,
                          {{&atlas, Layout::CopyDestination, Layout::CopySource, between, copy, {below, 1, 0, 1}},
                           {&atlas, Layout::Undefined, Layout::CopyDestination, 0, copy, {mip, 1, 0, 1}}});
-            made.command(CommandType::BlitMipmap,
+            made.command(CommandType::CopyTexture,
                          {{&atlas, Stage::Copy, AccessRead, Layout::CopySource, {below, 1, 0, 1}},
                           {&atlas, Stage::Copy, AccessWrite | AccessDiscard, Layout::CopyDestination, {mip, 1, 0, 1}}});
         }

@@ -32,7 +32,7 @@ enum class Stage : uint8_t {
     DepthTarget,  ///< depth and stencil attachments
     Compute,
     RayTracing,
-    Copy,   ///< copies, clears, mipmaps
+    Copy,   ///< copies, clears
     Build,  ///< acceleration structures: builds, copies, size queries
     Host,   ///< reads by the CPU after a wait
     Count,
@@ -93,7 +93,6 @@ enum class CommandType : uint8_t {
     CopyTextureToBuffer,
     CopyTexture,
     ClearTexture,
-    BlitMipmap,
     BuildTracings,
     CopyTracing,
     WriteTracingSize,
@@ -344,13 +343,6 @@ struct ClearTextureCommand {
         float f[4];
         uint32_t u[4];
     } value = {};  ///< by the format's type; depth in f[0], stencil in u[1]
-};
-
-/// Fills `slice.mip` from the level below it, `slice.layers` layers, linear filter.
-struct BlitMipmapCommand {
-    CommandHeader header;
-    uint32_t texture = 0;
-    Slice slice;
 };
 
 /// One build or update. Geometry comes from the Tracing object; instances from `instances`.

@@ -41,6 +41,7 @@ DeviceObject::~DeviceObject() {
     if (transfers_) recycleRecorder(transfers_);
     scratch_ = {};
     heap_ = {};
+    mipmaps_.clear();
     for (RecorderCore* recorder : recorders_) delete recorder;
     // The device is idle or lost: nothing is in use any more. Deleting one may retire others.
     while (!retired_.empty()) {

@@ -3,6 +3,7 @@
 // The object behind Device: the back end, the submit path, and what waits to be released.
 
 #include <glint/device/detail/backend.h>
+#include <glint/device/detail/mipmaps.h>
 #include <glint/device/detail/object.h>
 #include <glint/device/detail/tracing_heap.h>
 #include <glint/device/detail/tracker.h>
@@ -34,6 +35,7 @@ public:
     const DeviceInfo& info() const { return info_; }
     /// The heap of the software engine, null if the driver answers ray queries.
     TracingHeap* heap() const { return heap_.get(); }
+    MipmapKernels& mipmaps() { return mipmaps_; }
     /// From here on the driver builds structures beside the software engine.
     void buildForTraversals() { traversals_.store(true, std::memory_order_relaxed); }
     bool buildsForTraversals() const { return heap_ && traversals_.load(std::memory_order_relaxed); }
@@ -99,7 +101,7 @@ public:
 
     /// Scratch memory above this is not kept between builds.
     static constexpr uint64_t scratch_limit = 64ull << 20;
-    /// Scratch memory shared by the builds that bring none: one buffer, which grows.
+    /// Scratch memory shared by mip levels and by the builds that bring none: one buffer, which grows.
     Expected<Ref<BufferObject>> acquireScratch(uint64_t size, Where where);
 
     /// Plays what `core` holds, then puts compacted copies in the place of the structures. `core` is a fresh one
@@ -132,6 +134,7 @@ private:
     Features features_;
     DeviceInfo info_;
     std::shared_ptr<TracingHeap> heap_;
+    MipmapKernels mipmaps_{*this};
     std::atomic<bool> traversals_ = false;
 
     std::mutex submit_mutex_;  // of tracker_, next_value_, scratch below, last_use of objects

@@ -1,8 +1,10 @@
+#include <glint/device/detail/mipmaps.h>
 #include <glint/device/detail/recorder_core.h>
 #include <glint/device/detail/texture_layout.h>
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 
 namespace glint::detail {
 
@@ -363,25 +365,85 @@ void RecorderCore::clearTexture(const Texture& texture, const Color& color, Slic
 }
 
 void RecorderCore::createMipmaps(const Texture& texture, Where where) {
-    if (!recording(where) || !usable(texture, "createMipmaps", where) || !onQueue(Queue::Main, "createMipmaps", where))
+    if (!recording(where) || !usable(texture, "createMipmaps", where) ||
+        !onQueue(Queue::Compute, "createMipmaps", where))
         return;
     auto* object = static_cast<TextureObject*>(texture.object());
-    const FormatInfo& info = formatInfo(object->desc.format);
-    if (info.type != FormatType::Float || info.compressed)
+    const TextureDesc& desc = object->desc;
+    if (!MipmapKernels::canFilter(desc.format))
         return fail(where, ErrorCode::InvalidArgument, "mipmaps.format",
-                    "createMipmaps: {} has format {}, which cannot be filtered", object->label(), info.name);
-    const uint32_t resource = use(*object);
-    const auto layers = static_cast<uint16_t>(object->desc.layers);
-    for (uint32_t mip = 1; mip < object->desc.mipmaps; mip++) {
-        const Slice from = {static_cast<uint16_t>(mip - 1), 1, 0, layers};
-        const Slice slice = {static_cast<uint16_t>(mip), 1, 0, layers};
-        beginAccesses();
-        access(resource, Stage::Copy, AccessRead, Layout::CopySource, from);
-        access(resource, Stage::Copy, AccessWrite | AccessDiscard, Layout::CopyDestination, slice);
-        auto& command = push<BlitMipmapCommand>(CommandType::BlitMipmap);
-        command.texture = resource;
-        command.slice = slice;
+                    "createMipmaps: {} has format {}, which cannot be filtered", object->label(),
+                    toString(desc.format));
+    if (desc.mipmaps < 2) return;
+    const Features& features = device_->features();
+    const MipmapPlan plan = planMipmaps(desc, std::max(features.storageAlignment, 16u),
+                                        std::min(DeviceObject::scratch_limit, features.maxStorageSize));
+    const Expected<Ref<BufferObject>> scratch = device_->acquireScratch(plan.scratch, where);
+    if (!scratch) return fail(scratch.error());
+    (*scratch)->retain();
+    const Buffer memory(scratch->get());
+
+    // Nobody else sees the scratch memory: its hazards are not the caller's.
+    const bool tracking = std::exchange(tracking_, true);
+    size_t copied = 0;
+    const auto copyUpTo = [&](size_t end) {
+        for (; copied < end && !error(); copied++) {
+            const MipmapPass& pass = plan.passes[copied];
+            const auto mip = static_cast<uint16_t>(pass.level);
+            Slice slice = {mip, 1, static_cast<uint16_t>(pass.first_slice), static_cast<uint16_t>(pass.slices)};
+            Region box = mipRegion(desc, pass.level);
+            box.y = pass.first_row;
+            box.height = pass.rows;
+            if (desc.type == Texture::Type3D) {
+                box.z = pass.first_slice;
+                box.depth = pass.slices;
+                slice.layer = 0;
+                slice.layers = 1;
+            }
+            copyBufferTexture(CommandType::CopyBufferToTexture, texture, memory, pass.stored, slice, box, where);
+        }
+    };
+    for (size_t i = 0; i < plan.passes.size() && !error(); i++) {
+        // What is kept for the next level stays until then; before anything else, what is stored has to be copied.
+        if (!plan.passes[i].from_kept) copyUpTo(i);
+        makeMipmap(*object, plan, i, **scratch, where);
     }
+    copyUpTo(plan.passes.size());
+    tracking_ = tracking;
+}
+
+void RecorderCore::makeMipmap(TextureObject& texture, const MipmapPlan& plan, size_t index, BufferObject& scratch,
+                              Where where) {
+    const MipmapPass& pass = plan.passes[index];
+    const Expected<KernelObject*> kernel = device_->mipmaps().kernel(texture.desc, pass, where);
+    if (!kernel) return fail(kernel.error().at(where));
+    const uint32_t kernel_resource = use(**kernel);
+    const uint32_t scratch_resource = use(scratch);
+    BoundResource elements[3];
+    const auto bind = [&](BoundResource& element, uint64_t offset) {
+        element.resource = scratch_resource;
+        element.offset = offset;
+        element.size = std::min(plan.scratch - offset, device_->features().maxStorageSize);
+    };
+    bind(elements[1], pass.keeps ? pass.kept : pass.stored);
+    bind(elements[2], pass.stored);
+    beginAccesses();
+    access(scratch_resource, Stage::Compute, AccessRead | AccessWrite);
+    if (pass.from_kept) {
+        bind(elements[0], plan.passes[index - 1].kept);
+    } else {
+        elements[0].resource = use(texture);
+        elements[0].slice = {static_cast<uint16_t>(pass.level - 1), 1, 0, static_cast<uint16_t>(texture.desc.layers)};
+        access(elements[0].resource, Stage::Compute, AccessRead, Layout::Sampled, elements[0].slice);
+    }
+    const MipmapConstants constants = mipmapConstants(texture.desc, pass);
+    auto& command = push<DispatchCommand>(CommandType::Dispatch);
+    command.kernel = kernel_resource;
+    command.bindings.bound = append(elements, sizeof(elements), alignof(BoundResource));
+    command.bindings.bound_count = 3;
+    command.bindings.push = append(&constants, sizeof(constants), 4);
+    command.bindings.push_size = sizeof(constants);
+    MipmapKernels::countGroups(texture.desc, pass, command.groups);
 }
 
 void RecorderCore::hostRead(BufferObject& buffer) {

@@ -20,6 +20,7 @@
 namespace glint::detail {
 
 struct BuildPass;
+struct MipmapPlan;
 
 class RecorderCore {
 public:
@@ -237,6 +238,7 @@ private:
     void playSoftwareBuilds();
     /// Of the accesses that were begun.
     void copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size);
+    void makeMipmap(TextureObject& texture, const MipmapPlan& plan, size_t index, BufferObject& scratch, Where where);
     void traceRays(uint64_t width, uint64_t height, uint64_t depth, Where where);
     bool checkReferences(const TracingObject& tracing, Where where);
     void confirmBuild(TracingObject& tracing);

@@ -237,7 +237,9 @@ float SceneAnimation::duration() const {
 
 ScenePose Scene::pose() const { return poseOf(*this, nullptr, 0.0f); }
 
-ScenePose Scene::pose(uint32_t animation, float time) const { return poseOf(*this, &animations[animation], time); }
+ScenePose Scene::pose(uint32_t animation, float time) const {
+    return poseOf(*this, animation < animations.size() ? &animations[animation] : nullptr, time);
+}
 
 std::vector<Matrix4x4f> Scene::jointMatrices(const ScenePose& pose, uint32_t skin) const {
     const SceneSkin& source = skins[skin];

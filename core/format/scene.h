@@ -1,6 +1,7 @@
 #pragma once
 
 #include <glint/base/expected.h>
+#include <glint/base/status.h>
 #include <glint/format/image.h>
 #include <glint/format/mesh.h>
 #include <glint/math/math.h>
@@ -103,6 +104,11 @@ struct ScenePrimitive {
     std::vector<std::array<uint16_t, 4>> joints;     ///< of the skin of the node
     std::vector<Vector4f> weights;                   ///< of the joints: none negative, their sum is 1
     std::vector<SceneMorphTarget> targets;
+
+    /// Checks what the fields promise, and that the numbers of a vertex are finite. Errors: "scene.attribute_count"
+    /// (arrays that are not as long as they have to be), "scene.vertex_index", "scene.not_finite", "scene.weights"
+    /// (negative, or their sum is off 1 by more than 2^-16).
+    Status validate() const;
     bool operator==(const ScenePrimitive&) const = default;
 };
 
@@ -204,7 +210,8 @@ struct ScenePose {
 
 /// What a glTF file holds: nodes with meshes, materials, textures, skins, animations, cameras and lights. A plain
 /// value; fill it or load it. Right-handed, lengths in metres, +Y up. One that is filled by hand has to keep what the
-/// fields promise (numbers of elements in range, sizes of arrays); what load() and parseGltf() give does.
+/// fields promise (numbers of elements in range, sizes of arrays), which validate() checks; what load() and parseGltf()
+/// give does.
 struct Scene {
     std::vector<SceneNode> nodes;
     std::vector<uint32_t> roots;  ///< the nodes that are shown, with all below them; none is another's child
@@ -222,9 +229,18 @@ struct Scene {
     static Expected<Scene> load(const std::filesystem::path& path, uint64_t limit = Mesh::default_limit,
                                 bool with_images = true);
 
+    /// Errors, which name the element: those of ScenePrimitive::validate; "scene.index_range" (a number of an element
+    /// that is not there), "scene.tree" (the nodes are no forest, or a root has a parent or stands there twice),
+    /// "scene.joint_range" (a vertex follows a joint that the skin does not have), "scene.attribute_count" (also of
+    /// weights, targets, inverse binds and values of keys), "scene.not_finite" (also of transforms, matrices and keys),
+    /// "scene.key_order" (a channel without keys, or keys that are not one after the other), "scene.channel" (what
+    /// cannot move, or one property twice).
+    Status validate() const;
+
     /// Where everything is at rest, or at a time of an animation. Before the first and after the last key a property is
     /// as it is there, and so it is where the time is NaN; what no channel moves is at rest. Rotations go along the
     /// shorter arc; cubic splines of them are brought to unit length, and where they pass through zero nothing turns.
+    /// An animation that is not there moves nothing.
     ScenePose pose() const;
     ScenePose pose(uint32_t animation, float time) const;
 

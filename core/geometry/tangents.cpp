@@ -8,6 +8,7 @@
 
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace glint {
 
@@ -69,7 +70,10 @@ Expected<std::vector<Vector4f>> createTangents(Mesh& mesh) {
     const std::array streams = {meshopt_Stream{mesh.positions.data(), sizeof(Vector3f), sizeof(Vector3f)},
                                 meshopt_Stream{mesh.normals.data(), sizeof(Vector3f), sizeof(Vector3f)},
                                 meshopt_Stream{mesh.texcoords.data(), sizeof(Vector2f), sizeof(Vector2f)}};
-    meshopt_generateVertexRemapMulti<uint32_t>(shared.data(), nullptr, vertices, vertices, streams.data(),
+    // The library takes corners of whole triangles only.
+    std::vector<uint32_t> all((vertices + 2) / 3 * 3, 0);
+    std::iota(all.begin(), all.begin() + static_cast<ptrdiff_t>(vertices), 0u);
+    meshopt_generateVertexRemapMulti<uint32_t>(shared.data(), all.data(), all.size(), vertices, streams.data(),
                                                streams.size());
 
     // Sums for w = 1 and for w = -1, and whether anything was added.
@@ -123,6 +127,47 @@ Expected<std::vector<Vector4f>> createTangents(Mesh& mesh) {
         if (copies[i] != UINT32_MAX) set(copies[i], i, true);
     }
     return tangents;
+}
+
+Status createTangents(ScenePrimitive& primitive, uint32_t texcoord) {
+    if (Status status = primitive.validate(); !status) return status;
+    Mesh mesh;
+    mesh.positions = primitive.positions;
+    mesh.normals = primitive.normals;
+    if (texcoord < primitive.texcoords.size()) mesh.texcoords = primitive.texcoords[texcoord];
+    // Up the picture, which is where the green of glTF's normal maps points.
+    for (Vector2f& place : mesh.texcoords) place.y = -place.y;
+    mesh.indices = primitive.indices;
+    Expected<std::vector<Vector4f>> tangents = createTangents(mesh);
+    if (!tangents) return tangents.error();
+
+    // Triangles keep their places, so a corner says which vertex the new one at it is a copy of.
+    const size_t vertices = primitive.positions.size();
+    std::vector<uint32_t> sources(mesh.positions.size() - vertices);
+    for (size_t i = 0; i < mesh.indices.size(); i++)
+        if (mesh.indices[i] >= vertices) sources[mesh.indices[i] - vertices] = primitive.indices[i];
+    const auto split = [&](auto& values) {
+        if (values.empty()) return;
+        values.reserve(vertices + sources.size());
+        for (const uint32_t source : sources) {
+            const auto value = values[source];
+            values.push_back(value);
+        }
+    };
+    split(primitive.positions);
+    split(primitive.normals);
+    for (auto& texcoords : primitive.texcoords) split(texcoords);
+    split(primitive.colors);
+    split(primitive.joints);
+    split(primitive.weights);
+    for (SceneMorphTarget& target : primitive.targets) {
+        split(target.positions);
+        split(target.normals);
+        split(target.tangents);
+    }
+    primitive.indices = std::move(mesh.indices);
+    primitive.tangents = std::move(*tangents);
+    return {};
 }
 
 }  // namespace glint

@@ -2,6 +2,7 @@
 
 #include <glint/base/expected.h>
 #include <glint/format/mesh.h>
+#include <glint/format/scene.h>
 
 #include <vector>
 
@@ -25,5 +26,11 @@ namespace glint {
 /// Errors: those of Mesh::validate, "mesh.attribute_count" also where normals or texture coordinates are missing, and
 /// "mesh.too_large" (more than 2^32 - 1 vertices after splitting).
 Expected<std::vector<Vector4f>> createTangents(Mesh& mesh);
+
+/// The same for a primitive of a scene and the set of texture coordinates that its normal map is read with. Their v
+/// goes down the picture and glTF's maps count up it, so the bitangent points to where v shrinks. Replaces the
+/// primitive's tangents, and splits vertices with all that they have, joints, weights and morph targets included.
+/// Errors: those of ScenePrimitive::validate, "mesh.no_faces", "mesh.attribute_count" and "mesh.too_large" as above.
+Status createTangents(ScenePrimitive& primitive, uint32_t texcoord = 0);
 
 }  // namespace glint

@@ -1,15 +1,12 @@
 #include <glint/graphics/mesh_model.h>
 
 #include <glint/base/format_error.h>
-#include <glint/format/image.h>
+#include <glint/graphics/detail/vertex_source.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <new>
 #include <numeric>
-#include <optional>
 
 namespace glint {
 
@@ -21,120 +18,21 @@ constexpr MeshModel::Flags all_flags = MeshModel::FlagIndices16 | MeshModel::Fla
                                        MeshModel::FlagBufferStorage | MeshModel::FlagBufferTexel |
                                        MeshModel::FlagBufferAddress | MeshModel::FlagBufferTracing;
 
-const char* toString(Pipeline::Attribute attribute) {
-    constexpr const char* names[] = {"Position", "Basis",  "Normal", "Tangent", "TexCoord",
-                                     "Weights",  "Joints", "Color",  "Custom"};
-    return attribute <= Pipeline::AttributeCustom ? names[attribute] : "unknown";
+using detail::toString;
+using detail::VertexSource;
+
+bool wants(const MeshModel::Layout& layout, Pipeline::Attribute attribute) {
+    return std::ranges::find(layout, attribute, &Pipeline::VertexAttribute::attribute) != layout.end();
 }
 
-/// What a format can hold, and half of the distance between the values that it has there.
-struct FormatRange {
-    float low, high, half_step;
-};
-
-std::optional<FormatRange> rangeOf(Format format) {
-    switch (format) {
-        case FormatRf32:
-        case FormatRGf32:
-        case FormatRGBf32:
-        case FormatRGBAf32:
-            return FormatRange{-std::numeric_limits<float>::max(), std::numeric_limits<float>::max(), 0};
-        case FormatRf16:
-        case FormatRGf16:
-        case FormatRGBAf16: return FormatRange{-65504, 65504, 0};
-        case FormatRu8n:
-        case FormatRGu8n:
-        case FormatRGBAu8n:
-        case FormatBGRAu8n: return FormatRange{0, 1, 0.5f / 255};
-        case FormatRi8n:
-        case FormatRGi8n:
-        case FormatRGBAi8n: return FormatRange{-1, 1, 0.5f / 127};
-        case FormatRu16n:
-        case FormatRGu16n:
-        case FormatRGBAu16n: return FormatRange{0, 1, 0.5f / 65535};
-        case FormatRi16n:
-        case FormatRGi16n:
-        case FormatRGBAi16n: return FormatRange{-1, 1, 0.5f / 32767};
-        default: return std::nullopt;
-    }
-}
-
-bool isInteger(Format format) {
-    const FormatInfo& info = formatInfo(format);
-    return info.type == FormatType::Int || info.type == FormatType::Uint;
-}
-
-/// Writes one attribute of all vertices. `value(i)` is what vertex i has.
-template <class Value>
-Error writeAttribute(const Pipeline::VertexAttribute& attribute, std::byte* bytes, uint32_t vertices,
-                     const FormatRange& range, Value&& value) {
-    const FormatInfo& info = formatInfo(attribute.format);
-    const bool is_plain = info.block_size == info.components * sizeof(float);
-    // An image of one texel knows how to round to every format.
-    Expected<Image> texel = Image::create(attribute.format, 1, 1);
-    if (!texel) return texel.error();
-    for (uint32_t i = 0; i < vertices; i++, bytes += attribute.stride) {
-        const Vector4f v = value(i);
-        for (int c = 0; c < info.components; c++)
-            if (!(v[c] >= range.low - range.half_step && v[c] <= range.high + range.half_step))
-                return makeError(ErrorCode::OutOfRange, "model.range",
-                                 "vertex {} has {} in attribute {}; {} holds {} to {}", i, v[c],
-                                 toString(attribute.attribute), info.name, range.low, range.high);
-        if (is_plain) {
-            std::memcpy(bytes, &v, info.block_size);
-        } else {
-            texel->store(0, 0, v);
-            std::memcpy(bytes, texel->bytes().data(), info.block_size);
-        }
-    }
-    return {};
-}
-
-/// Writes an attribute where it belongs; `bytes` are zero.
-Error write(const Pipeline::VertexAttribute& attribute, const Mesh& mesh, const std::vector<Vector3f>& normals,
-            std::byte* bytes) {
-    const auto vertices = static_cast<uint32_t>(mesh.positions.size());
-    bytes += attribute.offset;
-    if (attribute.attribute == Pipeline::AttributeJoints) {
-        if (isInteger(attribute.format)) return {};
-        return makeError(ErrorCode::InvalidArgument, "model.format", "attribute Joints is of integers, not of {}",
-                         glint::toString(attribute.format));
-    }
-    const std::optional<FormatRange> range = rangeOf(attribute.format);
-    if (!range)
-        return makeError(ErrorCode::InvalidArgument, "model.format",
-                         "attribute {} cannot be {}: float32, float16, or 8 or 16 normalised bits",
-                         toString(attribute.attribute), glint::toString(attribute.format));
-    switch (attribute.attribute) {
-        case Pipeline::AttributePosition:
-            return writeAttribute(attribute, bytes, vertices, *range,
-                                  [&](uint32_t i) { return Vector4f(mesh.positions[i], 1.0f); });
-        case Pipeline::AttributeNormal:
-            return writeAttribute(attribute, bytes, vertices, *range,
-                                  [&](uint32_t i) { return Vector4f(normals[i], 0.0f); });
-        case Pipeline::AttributeTexCoord:
-            if (mesh.texcoords.empty())
-                return makeError(ErrorCode::InvalidArgument, "model.attribute", "the mesh has no texture coordinates");
-            return writeAttribute(attribute, bytes, vertices, *range,
-                                  [&](uint32_t i) { return Vector4f(mesh.texcoords[i], 0.0f, 0.0f); });
-        case Pipeline::AttributeColor:
-            return writeAttribute(attribute, bytes, vertices, *range, [](uint32_t) { return Vector4f(1.0f); });
-        case Pipeline::AttributeWeights:
-            return writeAttribute(attribute, bytes, vertices, *range, [](uint32_t) { return Vector4f(1, 0, 0, 0); });
-        default:
-            return makeError(ErrorCode::Unsupported, "model.attribute", "a mesh has nothing for attribute {}",
-                             toString(attribute.attribute));
-    }
-}
-
-std::vector<std::byte> indexBytes(const Mesh& mesh, Format format) {
+std::vector<std::byte> indexBytes(std::span<const uint32_t> indices, Format format) {
     const uint64_t size = format == FormatRu16 ? 2 : 4;
-    std::vector<std::byte> bytes((mesh.indices.size() * size + 3) / 4 * 4);
+    std::vector<std::byte> bytes((indices.size() * size + 3) / 4 * 4);
     if (format == FormatRu32) {
-        std::memcpy(bytes.data(), mesh.indices.data(), bytes.size());
+        std::memcpy(bytes.data(), indices.data(), bytes.size());
     } else {
-        for (size_t i = 0; i < mesh.indices.size(); i++) {
-            const auto index = static_cast<uint16_t>(mesh.indices[i]);
+        for (size_t i = 0; i < indices.size(); i++) {
+            const auto index = static_cast<uint16_t>(indices[i]);
             std::memcpy(&bytes[i * sizeof(index)], &index, sizeof(index));
         }
     }
@@ -155,21 +53,63 @@ MeshModel::MeshModel(const Device& device, const Layout& layout, const Mesh& mes
     (void)create(device, layout, mesh, flags, where);
 }
 
+MeshModel::MeshModel(const Device& device, const Pipeline& pipeline, const SceneMesh& mesh, Flags flags, Where where) {
+    (void)create(device, pipeline, mesh, flags, where);
+}
+
+MeshModel::MeshModel(const Device& device, const Layout& layout, const SceneMesh& mesh, Flags flags, Where where) {
+    (void)create(device, layout, mesh, flags, where);
+}
+
 Status MeshModel::create(const Device& device, const Mesh& mesh, Flags flags, Where where) {
     return create(device, Layout{{Pipeline::AttributePosition, FormatRGBf32, 0, 0, sizeof(Vector3f)}}, mesh, flags,
                   where);
 }
 
 Status MeshModel::create(const Device& device, const Pipeline& pipeline, const Mesh& mesh, Flags flags, Where where) {
-    const ObjectState state = pipeline.state();
-    if (state == ObjectState::Null || state == ObjectState::Failed) {
-        device_ = device;
-        return fail(pipeline.error().at(where));
-    }
+    if (Status status = layoutOf(device, pipeline, where); !status) return status;
     return create(device, pipeline.getAttributes(), mesh, flags, where);
 }
 
+Status MeshModel::create(const Device& device, const Pipeline& pipeline, const SceneMesh& mesh, Flags flags,
+                         Where where) {
+    if (Status status = layoutOf(device, pipeline, where); !status) return status;
+    return create(device, pipeline.getAttributes(), mesh, flags, where);
+}
+
+Status MeshModel::layoutOf(const Device& device, const Pipeline& pipeline, Where where) {
+    const ObjectState state = pipeline.state();
+    if (state != ObjectState::Null && state != ObjectState::Failed) return {};
+    device_ = device;
+    return fail(pipeline.error().at(where));
+}
+
 Status MeshModel::create(const Device& device, const Layout& layout, const Mesh& mesh, Flags flags, Where where) {
+    return create(device, layout, flags, where, mesh.positions.size(), mesh.indices.size(),
+                  [&]() -> Expected<VertexSource> {
+                      if (Status status = mesh.validate(); !status) return unexpected(status.error());
+                      return VertexSource::of(mesh, wants(layout_, Pipeline::AttributeNormal));
+                  });
+}
+
+Status MeshModel::create(const Device& device, const Layout& layout, const SceneMesh& mesh, Flags flags, Where where) {
+    uint64_t vertices = 0, indices = 0;
+    for (const ScenePrimitive& primitive : mesh.primitives) {
+        vertices += primitive.positions.size();
+        indices += primitive.indices.size();
+    }
+    return create(device, layout, flags, where, vertices, indices, [&]() -> Expected<VertexSource> {
+        for (size_t i = 0; i < mesh.primitives.size(); i++)
+            if (Status status = mesh.primitives[i].validate(); !status)
+                return unexpected(status.error().named(fmt::format("primitives[{}]", i)));
+        if (indices == 0)
+            return unexpected(makeError(ErrorCode::InvalidArgument, "mesh.no_faces", "the mesh has no triangles"));
+        return VertexSource::of(mesh, wants(layout_, Pipeline::AttributeNormal));
+    });
+}
+
+Status MeshModel::create(const Device& device, const Layout& layout, Flags flags, Where where, uint64_t vertices,
+                         uint64_t indices, const MakeSource& source) {
     device_ = device;
     error_ = {};
     layout_ = layout;
@@ -182,7 +122,7 @@ Status MeshModel::create(const Device& device, const Layout& layout, const Mesh&
     vertices_ = 0;
     vertex_size_ = index_size_ = vertex_offset_ = index_offset_ = 0;
     try {
-        return build(device, mesh, where);
+        return build(vertices, indices, source, where);
     } catch (const std::bad_alloc&) {
         return fail(makeError(where, ErrorCode::OutOfMemory, "model.out_of_memory",
                               "{}: memory for {} bytes of vertices and {} of indices ran out", name_, vertex_size_,
@@ -190,49 +130,41 @@ Status MeshModel::create(const Device& device, const Layout& layout, const Mesh&
     }
 }
 
-Status MeshModel::build(const Device& device, const Mesh& mesh, Where where) {
+Status MeshModel::build(uint64_t vertex_count, uint64_t index_count, const MakeSource& make, Where where) {
     const auto refused = [&](const Error& error) { return fail(error.named(name_).at(where)); };
-    if (!device) return fail(device.error().at(where));
-    if (Status status = mesh.validate(); !status) return refused(status.error());
-    if (Error error = checkFlags(mesh, where)) return fail(error);
-    if (Error error = findStreams(mesh.positions.size(), where)) return fail(error);
+    if (!device_) return fail(device_.error().at(where));
+    if (Error error = checkFlags(vertex_count, where)) return fail(error);
+    if (Error error = findStreams(vertex_count, where)) return fail(error);
 
     const bool is_read = flags_ & (FlagBufferStorage | FlagBufferTexel | FlagBufferAddress);
-    const bool fits = mesh.positions.size() <= 65536;
+    const bool fits = vertex_count <= 65536;
     index_format_ =
         (flags_ & FlagIndices16) || (fits && !is_read && !(flags_ & FlagIndices32)) ? FormatRu16 : FormatRu32;
-    index_size_ = (mesh.indices.size() * (index_format_ == FormatRu16 ? 2 : 4) + 3) / 4 * 4;
-    const uint64_t limit = device.getFeatures().maxBufferSize;
-    if (index_size_ > limit || mesh.indices.size() > UINT32_MAX)
+    index_size_ = (index_count * (index_format_ == FormatRu16 ? 2 : 4) + 3) / 4 * 4;
+    const uint64_t limit = device_.getFeatures().maxBufferSize;
+    if (index_size_ > limit || index_count > UINT32_MAX)
         return fail(makeError(where, ErrorCode::OutOfRange, "model.too_large",
-                              "{}: {} indices of {} bytes exceed the limit of {} bytes", name_, mesh.indices.size(),
+                              "{}: {} indices of {} bytes exceed the limit of {} bytes", name_, index_count,
                               index_size_, limit));
-    geometries_ = mesh.parts;
-    if (geometries_.empty()) geometries_.push_back({{}, 0, static_cast<uint32_t>(mesh.indices.size())});
+    const Expected<VertexSource> source = make();
+    if (!source) return refused(source.error());
+    geometries_ = source->parts;
 
-    std::vector<Vector3f> made;
-    const bool wants_normals = std::ranges::any_of(
-        layout_, [](const auto& attribute) { return attribute.attribute == Pipeline::AttributeNormal; });
-    if (wants_normals && mesh.normals.empty()) {
-        Mesh bare;
-        bare.positions = mesh.positions;
-        bare.indices = mesh.indices;
-        bare.createNormals();
-        made = std::move(bare.normals);
-    }
     std::vector<std::byte> vertices(vertex_size_);
-    for (const Pipeline::VertexAttribute& attribute : layout_)
-        if (const Error error = write(attribute, mesh, made.empty() ? mesh.normals : made,
-                                      vertices.data() + stream(attribute.buffer)->offset))
+    size_t texcoords = 0;
+    for (const Pipeline::VertexAttribute& attribute : layout_) {
+        const size_t set = attribute.attribute == Pipeline::AttributeTexCoord ? texcoords++ : 0;
+        if (const Error error = source->write(attribute, set, vertices.data() + stream(attribute.buffer)->offset))
             return refused(error);
-    const std::vector<std::byte> indices = indexBytes(mesh, index_format_);
+    }
+    const std::vector<std::byte> indices = indexBytes(source->indices, index_format_);
 
     Buffer::Flags flags = 0;
     if (flags_ & FlagBufferStorage) flags |= Buffer::FlagStorage;
     if (flags_ & FlagBufferTexel) flags |= Buffer::FlagTexel;
     if (flags_ & FlagBufferAddress) flags |= Buffer::FlagAddress;
     if (flags_ & FlagBufferTracing) flags |= Buffer::FlagTracing;
-    Device maker = device;
+    Device maker = device_;
     if (!vertex_callback_ || !vertex_callback_(vertices.data(), vertices.size()))
         vertex_buffer_ =
             maker.createBuffer(flags | Buffer::FlagVertex, std::span(vertices), name_ + " vertices", where);
@@ -244,16 +176,16 @@ Status MeshModel::build(const Device& device, const Mesh& mesh, Where where) {
     return {};
 }
 
-Error MeshModel::checkFlags(const Mesh& mesh, Where where) const {
+Error MeshModel::checkFlags(uint64_t vertices, Where where) const {
     if (flags_ & ~all_flags)
         return makeError(where, ErrorCode::InvalidArgument, "model.flags", "{}: unknown flags {:#x}", name_,
                          flags_ & ~all_flags);
     if ((flags_ & FlagIndices16) && (flags_ & FlagIndices32))
         return makeError(where, ErrorCode::InvalidArgument, "model.flags",
                          "{}: FlagIndices16 and FlagIndices32 exclude each other", name_);
-    if ((flags_ & FlagIndices16) && mesh.positions.size() > 65536)
+    if ((flags_ & FlagIndices16) && vertices > 65536)
         return makeError(where, ErrorCode::OutOfRange, "model.indices",
-                         "{}: {} vertices; indices of 16 bits name at most 65536", name_, mesh.positions.size());
+                         "{}: {} vertices; indices of 16 bits name at most 65536", name_, vertices);
     return {};
 }
 

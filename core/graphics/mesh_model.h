@@ -2,6 +2,7 @@
 
 #include <glint/device/device.h>
 #include <glint/format/mesh.h>
+#include <glint/format/scene.h>
 
 #include <cstddef>
 #include <cstdint>
@@ -12,6 +13,10 @@
 #include <vector>
 
 namespace glint {
+
+namespace detail {
+struct VertexSource;
+}
 
 /// A mesh on a device: vertices laid out as a pipeline's attributes want them, indices of 16 or 32 bits, and one
 /// geometry for each part of the mesh (one in all for a mesh without parts).
@@ -28,7 +33,7 @@ namespace glint {
 ///
 /// What an attribute gets:
 ///
-/// | attribute | value                                                      | components beyond |
+/// | attribute | value of a Mesh                                            | components beyond |
 /// |-----------|------------------------------------------------------------|-------------------|
 /// | Position  | positions                                                  | w is 1            |
 /// | Normal    | normals; a mesh without them: those of createNormals()     | 0                 |
@@ -37,6 +42,10 @@ namespace glint {
 /// | Joints    | 0, in an integer format                                    |                   |
 /// | Weights   | (1, 0, 0, 0): with Joints a mesh that joint 0 moves rigidly|                   |
 /// | others    | refused ("model.attribute")                                |                   |
+///
+/// The mesh of a scene has a geometry for each of its primitives, and what a primitive has: tangents, colours, joints
+/// and weights, and in a second TexCoord its second set. A primitive without some attribute gets what a Mesh gets, but
+/// texture coordinates of 0 and tangents of 0, which show no direction.
 ///
 /// Formats are float32, float16, and normalised 8 and 16 bits; components that a format lacks are dropped. Values are
 /// rounded to nearest: by at most 2^-11 of themselves in float16 (2^-25 where that is more), 1/510 in u8n, 1/254 in
@@ -69,6 +78,10 @@ public:
               Where where = Where::current());
     MeshModel(const Device& device, const Layout& layout, const Mesh& mesh, Flags flags = FlagNone,
               Where where = Where::current());
+    MeshModel(const Device& device, const Pipeline& pipeline, const SceneMesh& mesh, Flags flags = FlagNone,
+              Where where = Where::current());
+    MeshModel(const Device& device, const Layout& layout, const SceneMesh& mesh, Flags flags = FlagNone,
+              Where where = Where::current());
 
     /// Hand the bytes over instead of making buffers of them, so that many models lie in one: set before create(),
     /// which calls each once, vertices first. What was taken over comes back by setVertexBuffer and setIndexBuffer.
@@ -79,13 +92,17 @@ public:
 
     /// Lays out and uploads, anew if there was something. The vertices of each buffer slot of the layout follow one
     /// another in one buffer, each slot's from a multiple of 4 bytes and of its stride; the bytes of indices are
-    /// padded to a multiple of 4. The pipeline need not have been created. Errors: those of Mesh::validate and
-    /// Device::createBuffer, "model.layout", "model.attribute", "model.format", "model.range", "model.flags",
-    /// "model.indices", "model.too_large", "model.out_of_memory".
+    /// padded to a multiple of 4. The pipeline need not have been created. Errors: those of Mesh::validate or
+    /// ScenePrimitive::validate, and of Device::createBuffer, "mesh.no_faces", "model.layout", "model.attribute",
+    /// "model.format", "model.range", "model.flags", "model.indices", "model.too_large", "model.out_of_memory".
     Status create(const Device& device, const Mesh& mesh, Flags flags = FlagNone, Where where = Where::current());
     Status create(const Device& device, const Pipeline& pipeline, const Mesh& mesh, Flags flags = FlagNone,
                   Where where = Where::current());
     Status create(const Device& device, const Layout& layout, const Mesh& mesh, Flags flags = FlagNone,
+                  Where where = Where::current());
+    Status create(const Device& device, const Pipeline& pipeline, const SceneMesh& mesh, Flags flags = FlagNone,
+                  Where where = Where::current());
+    Status create(const Device& device, const Layout& layout, const SceneMesh& mesh, Flags flags = FlagNone,
                   Where where = Where::current());
 
     /// Where the vertices or indices that a callback has taken over lie. The offset is a multiple of 4, and such that
@@ -140,8 +157,13 @@ private:
         uint64_t offset = 0;  ///< from the beginning of the model's vertices
     };
 
-    Status build(const Device& device, const Mesh& mesh, Where where);
-    Error checkFlags(const Mesh& mesh, Where where) const;
+    Status layoutOf(const Device& device, const Pipeline& pipeline, Where where);
+    /// `source` checks the mesh and says what is laid out; it is asked once the numbers have been found to fit.
+    using MakeSource = std::function<Expected<detail::VertexSource>()>;
+    Status create(const Device& device, const Layout& layout, Flags flags, Where where, uint64_t vertices,
+                  uint64_t indices, const MakeSource& source);
+    Status build(uint64_t vertex_count, uint64_t index_count, const MakeSource& make, Where where);
+    Error checkFlags(uint64_t vertices, Where where) const;
     Error findStreams(uint64_t vertices, Where where);
     Error placed(const char* what, const Buffer& buffer, uint64_t offset, uint64_t size, Where where) const;
     Status fail(const Error& error);

@@ -109,8 +109,9 @@ vec4 clipPosition(uint vertex, mat4x3 to_world) {
 vec3 worldNormal(uint vertex, mat4x3 to_world) {
     const vec3 normal = vec3(normals[vertex * 3u], normals[vertex * 3u + 1u], normals[vertex * 3u + 2u]);
     // By cofactors: right for any transform that is no mirror.
-    return cross(to_world[1], to_world[2]) * normal.x + cross(to_world[2], to_world[0]) * normal.y +
-           cross(to_world[0], to_world[1]) * normal.z;
+    precise const vec3 result = cross(to_world[1], to_world[2]) * normal.x + cross(to_world[2], to_world[0]) * normal.y +
+                                cross(to_world[0], to_world[1]) * normal.z;
+    return result;
 }
 
 #endif

@@ -87,6 +87,8 @@ Benchmark splatTradeoffsBenchmark();
 Benchmark splatNeedlesBenchmark();
 Benchmark splatSpeedBenchmark();
 Benchmark splatGpuBenchmark();
+Benchmark rasterBenchmark();
+Benchmark rasterSceneBenchmark();
 
 /// A failure that ends one benchmark and not the others.
 template <class T>

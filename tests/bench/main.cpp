@@ -57,7 +57,8 @@ int main(int argc, char** argv) {
         tracingTradeoffsBenchmark(), tracingGpuBenchmark(),      castBenchmark(),         castMemoryBenchmark(),
         traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),     parallelGpuBenchmark(),
         splatAccuracyBenchmark(),    splatLoadBenchmark(),       splatFilesBenchmark(),   splatTradeoffsBenchmark(),
-        splatNeedlesBenchmark(),     splatSpeedBenchmark(),      splatGpuBenchmark(),     lodBenchmark()};
+        splatNeedlesBenchmark(),     splatSpeedBenchmark(),      splatGpuBenchmark(),     lodBenchmark(),
+        rasterBenchmark(),           rasterSceneBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

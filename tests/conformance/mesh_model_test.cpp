@@ -30,7 +30,8 @@ struct Captured {
     MeshModel model;
     Bytes vertices, indices;
 
-    Status create(const Device& device, const MeshModel::Layout& layout, const Mesh& mesh,
+    template <class AnyMesh>
+    Status create(const Device& device, const MeshModel::Layout& layout, const AnyMesh& mesh,
                   MeshModel::Flags flags = MeshModel::FlagNone) {
         const auto into = [](Bytes& bytes) {
             return [&bytes](const void* src, size_t size) {
@@ -287,6 +288,97 @@ TEST_P(MeshModelTest, MakesWhatIsMissing) {
     EXPECT_FALSE(captured.model);
     EXPECT_THAT(captured.create(device, layout, mesh), IsOk());
     EXPECT_TRUE(captured.model);
+}
+
+TEST_P(MeshModelTest, LaysOutMeshesOfScenes) {
+    ScenePrimitive full;
+    for (int i = 0; i < 3; i++) {
+        const auto f = static_cast<float>(i);
+        full.positions.emplace_back(f, f * f, 1);
+        full.normals.emplace_back(0, 0, -1);
+        full.tangents.emplace_back(0, 1, 0, -1);
+        full.texcoords[0].emplace_back(f, 0);
+        full.texcoords[1].emplace_back(0, f);
+        full.colors.emplace_back(f, 0.5f, 0, 1);
+        full.joints.push_back({static_cast<uint16_t>(i), 300, 2, 1});
+        full.weights.emplace_back(0.5f, 0.25f, 0.25f, 0);
+    }
+    full.indices = {0, 1, 2};
+    full.material = 5;
+    ScenePrimitive bare;
+    bare.positions = full.positions;
+    bare.indices = {2, 1, 0, 0, 2, 1};
+    const SceneMesh mesh{"two", {full, bare}, {}};
+
+    const MeshModel::Layout layout = {{Pipeline::AttributePosition, FormatRGBf32, 0, 0, 100},
+                                      {Pipeline::AttributeNormal, FormatRGBf32, 0, 12, 100},
+                                      {Pipeline::AttributeTangent, FormatRGBAf32, 0, 24, 100},
+                                      {Pipeline::AttributeTexCoord, FormatRGf32, 0, 40, 100},
+                                      {Pipeline::AttributeTexCoord, FormatRGf32, 0, 48, 100},
+                                      {Pipeline::AttributeColor, FormatRGBAf32, 0, 56, 100},
+                                      {Pipeline::AttributeJoints, FormatRGBAu16, 0, 72, 100},
+                                      {Pipeline::AttributeWeights, FormatRGBAf32, 0, 80, 100}};
+    Captured captured;
+    ASSERT_THAT(captured.create(device, layout, mesh), IsOk());
+    const MeshModel& model = captured.model;
+    EXPECT_EQ(model.getVertices(), 6u);
+    ASSERT_EQ(model.getGeometries(), 2u);
+    EXPECT_EQ(model.getName(1), "two");
+    EXPECT_EQ(model.getFirstIndex(1), 3u);
+    EXPECT_EQ(model.getIndices(1), 6u);
+    for (uint32_t i = 0; i < 9; i++)
+        EXPECT_EQ(captured.index(i), i < 3 ? full.indices[i] : 3 + bare.indices[i - 3]) << i;
+    const auto joints = [&](uint32_t vertex) {
+        std::array<uint16_t, 4> values;
+        std::memcpy(values.data(), &captured.vertices[vertex * 100 + 72], sizeof(values));
+        return values;
+    };
+    for (uint32_t i = 0; i < 3; i++) {
+        EXPECT_EQ(captured.load(layout[2], i), full.tangents[i]);
+        EXPECT_EQ(Vector2f(captured.load(layout[3], i)), full.texcoords[0][i]);
+        EXPECT_EQ(Vector2f(captured.load(layout[4], i)), full.texcoords[1][i]);
+        EXPECT_EQ(captured.load(layout[5], i), full.colors[i]);
+        EXPECT_EQ(joints(i), full.joints[i]);
+        EXPECT_EQ(captured.load(layout[7], i), full.weights[i]);
+    }
+    for (uint32_t i = 3; i < 6; i++) {
+        EXPECT_EQ(Vector3f(captured.load(layout[0], i)), bare.positions[i - 3]);
+        EXPECT_EQ(captured.load(layout[2], i), Vector4f(0, 0, 0, 1));
+        EXPECT_EQ(Vector2f(captured.load(layout[3], i)), Vector2f(0.0f));
+        EXPECT_EQ(captured.load(layout[5], i), Vector4f(1.0f));
+        EXPECT_EQ(joints(i), (std::array<uint16_t, 4>{}));
+        EXPECT_EQ(captured.load(layout[7], i), Vector4f(1, 0, 0, 0));
+        // Of the triangle 2 1 0, twice.
+        EXPECT_EQ(Vector3f(captured.load(layout[1], i)), Vector3f(0, 0, -1));
+    }
+
+    const auto with = [&](Pipeline::Attribute attribute, Format format) {
+        return [&, attribute, format] {
+            const uint32_t size = formatInfo(format).block_size;
+            return MeshModel(device,
+                             {{Pipeline::AttributePosition, FormatRGBf32, 1, 0, 12}, {attribute, format, 0, 0, size}},
+                             mesh)
+                .error();
+        };
+    };
+    for (const Format format : {FormatRGBAu32, FormatRu16, FormatRGBAi16, FormatRGBAi32})
+        EXPECT_THAT(with(Pipeline::AttributeJoints, format)(), IsOk()) << toString(format);
+    expectError("model.range", with(Pipeline::AttributeJoints, FormatRGBAu8));
+    expectError("model.range", with(Pipeline::AttributeJoints, FormatRGBAi8));
+    expectError("model.format", with(Pipeline::AttributeJoints, FormatRGBAf32));
+    expectError("model.range", with(Pipeline::AttributeColor, FormatRGBAu8n));
+    expectError("model.attribute", with(Pipeline::AttributeBasis, FormatRGBAf32));
+    expectError("model.attribute", [&] {
+        MeshModel::Layout third = layout;
+        third.push_back({Pipeline::AttributeTexCoord, FormatRGf32, 1, 0, 8});
+        return MeshModel(device, third, mesh).error();
+    });
+    expectError("mesh.no_faces", [&] { return MeshModel(device, layout, SceneMesh()).error(); });
+    expectError("scene.vertex_index", [&] {
+        SceneMesh wrong = mesh;
+        wrong.primitives[1].indices[0] = 3;
+        return MeshModel(device, layout, wrong).error();
+    });
 }
 
 TEST_P(MeshModelTest, RefusesMoreThanABufferHolds) {

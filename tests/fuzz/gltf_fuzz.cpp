@@ -1,4 +1,4 @@
-// Any bytes give an error or a scene that can be posed and flattened.
+// Any bytes give an error or a scene that is valid and can be posed and flattened.
 
 #include <glint/base/log.h>
 #include <glint/format/gltf.h>
@@ -39,6 +39,7 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t* data, size_t size) {
         require(scene.error().id().starts_with("gltf.") || scene.error().id().starts_with("image."));
         return 0;
     }
+    require(static_cast<bool>(scene->validate()));
     flatten(*scene, scene->pose());
     for (uint32_t i = 0; i < std::min<size_t>(scene->animations.size(), 3); i++)
         for (const float part : {0.0f, 0.3f, 1.0f})

@@ -1,5 +1,7 @@
 #include "scene_reference.h"
 
+#include "reference.h"
+
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
@@ -139,7 +141,7 @@ Vector3d crossBound(const Vector3d& a, const Vector3d& a_off, const Vector3d& b,
 
 /// A normal by the inverse transpose, of unit length; in float64 but for the matrix and the morphed normal, and rounded
 /// once. Bringing a vector to unit length divides its error by its length, and at most doubles it.
-Bounded<Vector3d> turned(const BoundedMatrix& m, const Bounded<Vector3d>& n) {
+Bounded<Vector3d> turned(const BoundedMatrix& m, const Bounded<Vector3d>& n, const NormalRounding& rounding) {
     const Vector3d axes[3] = {Vector3d(m.value[0]), Vector3d(m.value[1]), Vector3d(m.value[2])};
     const Vector3d off[3] = {Vector3d(m.bound[0]), Vector3d(m.bound[1]), Vector3d(m.bound[2])};
     Vector3d direction(0.0), error(0.0);
@@ -148,14 +150,95 @@ Bounded<Vector3d> turned(const BoundedMatrix& m, const Bounded<Vector3d>& n) {
         const Vector3d cofactors = glm::cross(axes[j], axes[k]);
         direction += cofactors * n.value[i];
         error += crossBound(axes[j], off[j], axes[k], off[k]) * (std::fabs(n.value[i]) + n.bound[i]) +
-                 glm::abs(cofactors) * n.bound[i];
+                 glm::abs(cofactors) * (n.bound[i] + rounding.products * u * std::fabs(n.value[i]));
     }
     if (glm::dot(axes[0], glm::cross(axes[1], axes[2])) < 0.0) direction = -direction;
     const double length = glm::length(direction);
-    return {direction / length, Vector3d(2 * glm::length(error) / length + u)};
+    return {direction / length, Vector3d(2 * glm::length(error) / length + rounding.unit * u)};
+}
+
+float uniform(Random& random, double low, double high) { return static_cast<float>(random.uniform(low, high)); }
+
+Vector3f vector(Random& random, double size) {
+    return {uniform(random, -size, size), uniform(random, -size, size), uniform(random, -size, size)};
+}
+
+Vector4f quaternion(Random& random) {
+    const Vector3f xyz = vector(random, 1.0);
+    return {xyz, uniform(random, -1, 1)};
+}
+
+ScenePrimitive square(Random& random, bool with_joints) {
+    ScenePrimitive primitive;
+    primitive.indices = {0, 1, 2, 2, 1, 3};
+    for (int i = 0; i < 4; i++) {
+        primitive.positions.push_back(vector(random, 2.0));
+        primitive.normals.push_back(Vector3f(random.direction()));
+        primitive.texcoords[0].emplace_back(uniform(random, 0, 1), uniform(random, 0, 1));
+        if (!with_joints) continue;
+        Vector4d weights(random.uniform(), random.uniform(), random.uniform(), random.uniform());
+        weights /= weights.x + weights.y + weights.z + weights.w;
+        primitive.weights.emplace_back(weights);
+        primitive.joints.push_back({0, 1, 2, static_cast<uint16_t>(i % 3)});
+    }
+    for (int k = 0; k < 2; k++) {
+        SceneMorphTarget& target = primitive.targets.emplace_back();
+        for (int i = 0; i < 4; i++) {
+            target.positions.push_back(vector(random, 0.5));
+            // Small, so that no normal comes near to length zero.
+            if (k == 0) target.normals.push_back(vector(random, 0.2));
+        }
+    }
+    return primitive;
+}
+
+SceneChannel channel(Random& random, uint32_t node, ScenePath path, SceneInterpolation interpolation) {
+    SceneChannel result{node, path, interpolation, {}, {}};
+    const size_t width = path == ScenePath::Rotation ? 4 : path == ScenePath::Weights ? 2 : 3;
+    for (int key = 0; key < 5; key++) {
+        result.times.push_back(static_cast<float>(key) + uniform(random, 0, 0.9));
+        for (int part = 0; part < (interpolation == SceneInterpolation::CubicSpline ? 3 : 1); part++) {
+            const double low = path == ScenePath::Scale ? 0.5 : -1.0;
+            for (size_t i = 0; i < width; i++) result.values.push_back(uniform(random, low, 1.5));
+        }
+    }
+    return result;
 }
 
 }  // namespace
+
+Scene randomScene(uint64_t seed) {
+    Random random(seed);
+    Scene scene;
+    scene.meshes = {{"skinned", {square(random, true)}, {0.25f, -0.5f}}, {"plain", {square(random, false)}, {0, 0}}};
+    for (uint32_t i = 0; i < 8; i++) {
+        SceneNode& node = scene.nodes.emplace_back();
+        node.transform = {vector(random, 3.0), quaternion(random), Vector3f(1.0f) + vector(random, 0.4)};
+        if (i < 5) node.children = {i + 1};
+    }
+    scene.nodes[3].matrix = Matrix4x4f(Vector4f(vector(random, 1.0), 0), Vector4f(vector(random, 1.0), 0),
+                                       Vector4f(vector(random, 1.0), 0), Vector4f(vector(random, 1.0), 1));
+    scene.nodes[6].mesh = 0;
+    scene.nodes[6].skin = 0;
+    scene.nodes[4].children.push_back(7);
+    scene.nodes[7].mesh = 1;
+    scene.nodes[7].weights = {0.5f, 0.75f};
+    scene.roots = {0, 6};
+    SceneSkin& skin = scene.skins.emplace_back();
+    skin.joints = {1, 4, 2};
+    for (int i = 0; i < 3; i++)
+        skin.inverse_bind.push_back(
+            SceneTransform{vector(random, 1.0), quaternion(random), Vector3f(1.0f) + vector(random, 0.3)}.matrix());
+    SceneAnimation& animation = scene.animations.emplace_back();
+    using enum ScenePath;
+    uint32_t at = static_cast<uint32_t>(seed);
+    for (const uint32_t node : {0u, 1u, 2u, 4u, 5u})
+        for (const ScenePath path : {Translation, Rotation, Scale})
+            animation.channels.push_back(channel(random, node, path, static_cast<SceneInterpolation>(at++ % 3)));
+    for (const uint32_t node : {6u, 7u})
+        animation.channels.push_back(channel(random, node, Weights, static_cast<SceneInterpolation>(at++ % 3)));
+    return scene;
+}
 
 ReferencePose referencePose(const Scene& scene, uint32_t animation, float time) {
     ReferencePose pose;
@@ -205,7 +288,7 @@ ReferencePose referencePose(const Scene& scene, uint32_t animation, float time) 
     return pose;
 }
 
-ReferenceMesh referenceMesh(const Scene& scene, const ReferencePose& pose) {
+ReferenceMesh referenceMesh(const Scene& scene, const ReferencePose& pose, const NormalRounding& rounding) {
     ReferenceMesh mesh;
     bool has_normals = true;
     const std::function<void(uint32_t)> add = [&](uint32_t index) {
@@ -244,7 +327,7 @@ ReferenceMesh referenceMesh(const Scene& scene, const ReferencePose& pose) {
                         }
                     }
                     mesh.positions.push_back(transformed(matrix, position));
-                    mesh.normals.push_back(turned(matrix, normal));
+                    mesh.normals.push_back(turned(matrix, normal, rounding));
                 }
         for (const uint32_t child : node.children) add(child);
     };

@@ -30,7 +30,18 @@ struct ReferenceMesh {
     std::vector<Bounded<Vector3d>> normals;  ///< empty unless every primitive has them
 };
 
+/// How many roundings a transformed normal takes besides those of its matrix: each product of a cofactor and a
+/// component of the normal, and each component at the end. The host works in float64 and rounds once.
+struct NormalRounding {
+    double products = 0.0;
+    double unit = 1.0;
+};
+
 /// The vertices of Scene::mesh(pose), in its order.
-ReferenceMesh referenceMesh(const Scene& scene, const ReferencePose& pose);
+ReferenceMesh referenceMesh(const Scene& scene, const ReferencePose& pose, const NormalRounding& rounding = {});
+
+/// A chain of six nodes beside a node with a skinned mesh whose joints are three of them, and one with a plain mesh:
+/// morphed, animated by all interpolations, quaternions of any length and sign.
+Scene randomScene(uint64_t seed);
 
 }  // namespace glint::test

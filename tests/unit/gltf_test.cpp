@@ -232,6 +232,23 @@ TEST(Gltf, NormalsTangentsAndWeightsAreNormalised) {
     EXPECT_EQ(primitive.joints[1], (std::array<uint16_t, 4>{5, 0, 0, 0}));
 }
 
+// More than four joints a vertex: the further ones are left out, and the first four share what there is.
+TEST(Gltf, FurtherJointsAreLeftOut) {
+    GltfBuilder builder = triangle();
+    json& attributes = builder.json["meshes"][0]["primitives"][0]["attributes"];
+    for (const char* set : {"0", "1"}) {
+        attributes[std::string("JOINTS_") + set] =
+            builder.accessor(std::vector<uint8_t>{1, 2, 3, 4, 1, 2, 3, 4, 1, 2, 3, 4}, "VEC4");
+        attributes[std::string("WEIGHTS_") + set] = builder.accessor(std::vector<float>(12, 0.125f), "VEC4");
+    }
+    const Warnings warnings;
+    const Expected<Scene> scene = parse(builder.text());
+    ASSERT_THAT(scene, IsOk());
+    EXPECT_THAT(scene->validate(), IsOk());
+    EXPECT_EQ(warnings.ids, "gltf.attribute_dropped gltf.attribute_dropped ");
+    EXPECT_EQ(scene->meshes[0].primitives[0].weights[0], Vector4f(0.25f));
+}
+
 TEST(Gltf, Materials) {
     GltfBuilder builder;
     builder.json.merge_patch(json::parse(R"({

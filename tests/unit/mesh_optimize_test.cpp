@@ -254,6 +254,53 @@ TEST(Tangents, AreThoseOfTheTexture) {
     EXPECT_EQ(*createTangents(again), *tangents);
 }
 
+// The library that finds shared vertices takes whole triangles only, and says so by ending the program.
+TEST(Tangents, OfAnyNumberOfVertices) {
+    for (uint32_t segments = 1; segments < 6; segments++) {
+        Mesh mesh = createPlane(1.0f, segments);
+        const size_t vertices = mesh.positions.size();
+        ASSERT_THAT(createTangents(mesh), IsOk()) << vertices;
+        EXPECT_EQ(mesh.positions.size(), vertices);
+    }
+}
+
+// A square in z = 0, its right half mirrored in the texture, so that the vertices in the middle are split.
+TEST(Tangents, OfAPrimitive) {
+    ScenePrimitive primitive;
+    for (int x = 0; x < 3; x++)
+        for (int y = 0; y < 2; y++) {
+            primitive.positions.emplace_back(x, y, 0);
+            primitive.normals.emplace_back(0, 0, 1);
+            // v goes down the picture.
+            primitive.texcoords[0].emplace_back(7, 7);
+            primitive.texcoords[1].emplace_back(x == 1 ? 1 : 0, 1 - y);
+            primitive.colors.emplace_back(x, y, 0, 1);
+            primitive.joints.push_back({static_cast<uint16_t>(x), 0, 0, 0});
+            primitive.weights.emplace_back(1, 0, 0, 0);
+        }
+    primitive.targets = {{primitive.positions, primitive.normals, primitive.positions}, {}};
+    primitive.indices = {0, 2, 3, 0, 3, 1, 2, 4, 5, 2, 5, 3};
+    const ScenePrimitive before = primitive;
+    ASSERT_THAT(createTangents(primitive, 1), IsOk());
+    EXPECT_THAT(primitive.validate(), IsOk());
+    ASSERT_EQ(primitive.positions.size(), 8u);
+    for (size_t i = 0; i < primitive.indices.size(); i++) {
+        const uint32_t now = primitive.indices[i], then = before.indices[i];
+        EXPECT_EQ(primitive.positions[now], before.positions[then]);
+        EXPECT_EQ(primitive.texcoords[1][now], before.texcoords[1][then]);
+        EXPECT_EQ(primitive.colors[now], before.colors[then]);
+        EXPECT_EQ(primitive.joints[now], before.joints[then]);
+        EXPECT_EQ(primitive.targets[0].tangents[now], before.targets[0].tangents[then]);
+        // u grows to the right on the left, and v shrinks upward: the bitangent w * (z x t) is +Y on both sides.
+        const bool is_right = i >= 6;
+        EXPECT_EQ(primitive.tangents[now], Vector4f(is_right ? -1 : 1, 0, 0, is_right ? -1 : 1)) << i;
+    }
+    ScenePrimitive again = before;
+    EXPECT_THAT(createTangents(again, 2), HasErrorId("mesh.attribute_count")) << "there is no third set";
+    again.joints.pop_back();
+    EXPECT_THAT(createTangents(again), HasErrorId("scene.attribute_count"));
+}
+
 TEST(Tangents, WithoutATexture) {
     Mesh mesh = createPlane(1.0f, 2);
     std::fill(mesh.texcoords.begin(), mesh.texcoords.end(), Vector2f(0.5f));

@@ -25,77 +25,6 @@ Vector4f quaternion(Random& random) {
     return {xyz, uniform(random, -1, 1)};
 }
 
-ScenePrimitive square(Random& random, bool with_joints) {
-    ScenePrimitive primitive;
-    primitive.indices = {0, 1, 2, 2, 1, 3};
-    for (int i = 0; i < 4; i++) {
-        primitive.positions.push_back(vector(random, 2.0));
-        primitive.normals.push_back(Vector3f(random.direction()));
-        primitive.texcoords[0].emplace_back(uniform(random, 0, 1), uniform(random, 0, 1));
-        if (!with_joints) continue;
-        Vector4d weights(random.uniform(), random.uniform(), random.uniform(), random.uniform());
-        weights /= weights.x + weights.y + weights.z + weights.w;
-        primitive.weights.emplace_back(weights);
-        primitive.joints.push_back({0, 1, 2, static_cast<uint16_t>(i % 3)});
-    }
-    for (int k = 0; k < 2; k++) {
-        SceneMorphTarget& target = primitive.targets.emplace_back();
-        for (int i = 0; i < 4; i++) {
-            target.positions.push_back(vector(random, 0.5));
-            // Small, so that no normal comes near to length zero.
-            if (k == 0) target.normals.push_back(vector(random, 0.2));
-        }
-    }
-    return primitive;
-}
-
-SceneChannel channel(Random& random, uint32_t node, ScenePath path, SceneInterpolation interpolation) {
-    SceneChannel result{node, path, interpolation, {}, {}};
-    const size_t width = path == ScenePath::Rotation ? 4 : path == ScenePath::Weights ? 2 : 3;
-    for (int key = 0; key < 5; key++) {
-        result.times.push_back(static_cast<float>(key) + uniform(random, 0, 0.9));
-        for (int part = 0; part < (interpolation == SceneInterpolation::CubicSpline ? 3 : 1); part++) {
-            const double low = path == ScenePath::Scale ? 0.5 : -1.0;
-            for (size_t i = 0; i < width; i++) result.values.push_back(uniform(random, low, 1.5));
-        }
-    }
-    return result;
-}
-
-/// A chain of six nodes beside a node with a skinned mesh whose joints are three of them, and one with a plain mesh.
-Scene randomScene(uint64_t seed) {
-    Random random(seed);
-    Scene scene;
-    scene.meshes = {{"skinned", {square(random, true)}, {0.25f, -0.5f}}, {"plain", {square(random, false)}, {0, 0}}};
-    for (uint32_t i = 0; i < 8; i++) {
-        SceneNode& node = scene.nodes.emplace_back();
-        node.transform = {vector(random, 3.0), quaternion(random), Vector3f(1.0f) + vector(random, 0.4)};
-        if (i < 5) node.children = {i + 1};
-    }
-    scene.nodes[3].matrix = Matrix4x4f(Vector4f(vector(random, 1.0), 0), Vector4f(vector(random, 1.0), 0),
-                                       Vector4f(vector(random, 1.0), 0), Vector4f(vector(random, 1.0), 1));
-    scene.nodes[6].mesh = 0;
-    scene.nodes[6].skin = 0;
-    scene.nodes[4].children.push_back(7);
-    scene.nodes[7].mesh = 1;
-    scene.nodes[7].weights = {0.5f, 0.75f};
-    scene.roots = {0, 6};
-    SceneSkin& skin = scene.skins.emplace_back();
-    skin.joints = {1, 4, 2};
-    for (int i = 0; i < 3; i++)
-        skin.inverse_bind.push_back(
-            SceneTransform{vector(random, 1.0), quaternion(random), Vector3f(1.0f) + vector(random, 0.3)}.matrix());
-    SceneAnimation& animation = scene.animations.emplace_back();
-    using enum ScenePath;
-    uint32_t at = static_cast<uint32_t>(seed);
-    for (const uint32_t node : {0u, 1u, 2u, 4u, 5u})
-        for (const ScenePath path : {Translation, Rotation, Scale})
-            animation.channels.push_back(channel(random, node, path, static_cast<SceneInterpolation>(at++ % 3)));
-    for (const uint32_t node : {6u, 7u})
-        animation.channels.push_back(channel(random, node, Weights, static_cast<SceneInterpolation>(at++ % 3)));
-    return scene;
-}
-
 template <class T>
 void expectWithin(const T& value, const Bounded<Vector3d>& reference, double& largest, const char* what) {
     for (int k = 0; k < 3; k++) {
@@ -104,6 +33,9 @@ void expectWithin(const T& value, const Bounded<Vector3d>& reference, double& la
         largest = std::max(largest, error / std::max(reference.bound[k], 1e-300));
     }
 }
+
+/// Two triangles without joints, with two morph targets.
+ScenePrimitive squareOf(uint64_t seed) { return randomScene(seed).meshes[1].primitives[0]; }
 
 Scene nodeWith(SceneChannel channel) {
     Scene scene;
@@ -274,7 +206,7 @@ TEST(Scene, MirroringNodesKeepFrontFaces) {
 TEST(Scene, PartsNameNodesAndMaterials) {
     Random random(6);
     Scene scene;
-    ScenePrimitive first = square(random, false), second = square(random, false);
+    ScenePrimitive first = squareOf(3), second = squareOf(4);
     for (ScenePrimitive* each : {&first, &second}) each->targets.clear();
     second.material = 3;
     second.indices.resize(3);
@@ -299,7 +231,7 @@ TEST(Scene, PartsNameNodesAndMaterials) {
 TEST(Scene, PartialAttributesAreDroppedWithAWarning) {
     Random random(6);
     Scene scene;
-    scene.meshes = {{"", {square(random, false), square(random, false)}, {0, 0}}};
+    scene.meshes = {{"", {squareOf(5), squareOf(6)}, {0, 0}}};
     scene.nodes = {SceneNode{.mesh = 0}};
     scene.roots = {0};
     scene.meshes[0].primitives[1].normals.clear();
@@ -314,10 +246,9 @@ TEST(Scene, PartialAttributesAreDroppedWithAWarning) {
 }
 
 TEST(Scene, MeshesThatCannotBe) {
-    Random random(6);
     Scene scene;
     EXPECT_THAT(scene.mesh(scene.pose()), HasErrorId("mesh.no_faces"));
-    scene.meshes = {{"", {square(random, false)}, {0, 0}}};
+    scene.meshes = {{"", {squareOf(6)}, {0, 0}}};
     scene.nodes = {SceneNode{.mesh = 0}};
     EXPECT_THAT(scene.mesh(scene.pose()), HasErrorId("mesh.no_faces")) << "nothing is shown";
     scene.roots = {0};

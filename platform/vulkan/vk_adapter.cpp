@@ -355,13 +355,15 @@ Enabled enabledFeatures(const Adapter& adapter, FeatureMask wanted) {
 
 namespace {
 
-/// Layouts declare tables at their largest, so a program's four, and what it has besides, have to fit.
+/// Layouts declare tables at their largest, so a program's four, and what it has besides, have to fit. No more than a
+/// scene may ask for: lavapipe makes every set as large as its layout.
 uint32_t tableSize(const VkPhysicalDeviceLimits& limits, SlotKind element) {
+    constexpr uint32_t most = 65536;
     const bool is_texture = element == SlotKind::Texture;
     const uint32_t stage =
         is_texture ? limits.maxPerStageDescriptorSampledImages : limits.maxPerStageDescriptorStorageBuffers;
     const uint32_t set = is_texture ? limits.maxDescriptorSetSampledImages : limits.maxDescriptorSetStorageBuffers;
-    return std::min({stage, set, limits.maxPerStageResources}) / 8;
+    return std::min({stage / 8, set / 8, limits.maxPerStageResources / 8, most});
 }
 
 /// Where task and mesh shaders have limits of their own, the lower one: groups are started the same way.

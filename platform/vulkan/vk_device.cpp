@@ -32,6 +32,7 @@ VulkanDevice::VulkanDevice(std::shared_ptr<Instance> shared, const Adapter& chos
       adapter(chosen),
       enabled(wanted),
       layouts(*this),
+      tables(*this),
       upload(memory, families),
       features_(describeFeatures(*instance, adapter, enabled.mask)) {
     for (uint32_t family : adapter.families) {

@@ -4,6 +4,7 @@
 #include "platform/vulkan/vk_layout.h"
 #include "platform/vulkan/vk_memory.h"
 #include "platform/vulkan/vk_queue.h"
+#include "platform/vulkan/vk_table.h"
 #include "platform/vulkan/vk_upload.h"
 
 #include <glint/device/detail/backend.h>
@@ -93,6 +94,7 @@ public:
     std::vector<uint32_t> families;  ///< of the queues, each once
     Memory memory;
     LayoutCache layouts;
+    TableSets tables;
     Upload upload;
 
 private:

@@ -6,34 +6,36 @@
 #include "platform/vulkan/vk_result.h"
 #include "platform/vulkan/vk_texture.h"
 
+#include <algorithm>
+
 namespace glint::vulkan {
 
 using namespace detail;
 
-VulkanTable::~VulkanTable() {
-    for (const Set& set : sets_) device_.vk.DestroyDescriptorPool(device_.handle, set.pool, nullptr);
+namespace {
+
+/// As many as a few tables have that change with each frame while others are in flight.
+constexpr size_t most_free = 8;
+
+}  // namespace
+
+TableSets::~TableSets() {
+    for (const Set& set : free_) device_.vk.DestroyDescriptorPool(device_.handle, set.pool, nullptr);
 }
 
-Expected<VkDescriptorSet> VulkanTable::set(const SetLayout& layout, const LayoutElement& element,
-                                           const TableContents& contents) {
-    for (const Set& known : sets_) {
-        if (known.layout == layout.handle && known.dimension == element.dimension) return known.handle;
+Expected<TableSets::Set> TableSets::acquire(VkDescriptorSetLayout layout, VkDescriptorType type, uint32_t count) {
+    {
+        std::lock_guard lock(mutex_);
+        const auto known = std::find_if(free_.rbegin(), free_.rend(),
+                                        [&](const Set& set) { return set.layout == layout && set.count == count; });
+        if (known != free_.rend()) {
+            const Set set = *known;
+            free_.erase(std::next(known).base());
+            return set;
+        }
     }
-    Expected<Set> made = allocate(layout, element, static_cast<uint32_t>(contents.entries.size()));
-    if (!made) return unexpected(made.error().named(name_));
-    sets_.push_back(*made);
-    if (contents.element == SlotKind::Storage) {
-        writeBuffers(made->handle, layout, contents);
-    } else if (Status status = writeTextures(made->handle, layout, element.dimension, contents); !status) {
-        return unexpected(status.error().named(name_));
-    }
-    return made->handle;
-}
-
-Expected<VulkanTable::Set> VulkanTable::allocate(const SetLayout& layout, const LayoutElement& element,
-                                                 uint32_t count) {
-    Set set{layout.handle, element.dimension};
-    const VkDescriptorPoolSize size = {element.type, count};
+    Set set{layout, count};
+    const VkDescriptorPoolSize size = {type, count};
     VkDescriptorPoolCreateInfo pool_info = {VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO};
     pool_info.maxSets = 1;
     pool_info.poolSizeCount = 1;
@@ -48,7 +50,7 @@ Expected<VulkanTable::Set> VulkanTable::allocate(const SetLayout& layout, const 
     info.pNext = &variable;
     info.descriptorPool = set.pool;
     info.descriptorSetCount = 1;
-    info.pSetLayouts = &layout.handle;
+    info.pSetLayouts = &layout;
     result = device_.vk.AllocateDescriptorSets(device_.handle, &info, &set.handle);
     if (result != VK_SUCCESS) {
         device_.vk.DestroyDescriptorPool(device_.handle, set.pool, nullptr);
@@ -58,45 +60,70 @@ Expected<VulkanTable::Set> VulkanTable::allocate(const SetLayout& layout, const 
     return set;
 }
 
-Status VulkanTable::writeTextures(VkDescriptorSet set, const SetLayout& layout, ImageDimension dimension,
-                                  const TableContents& contents) {
-    // Without a view it is a null descriptor, which reads as 0.
-    std::vector<VkDescriptorImageInfo> infos(
-        contents.entries.size(), {VK_NULL_HANDLE, VK_NULL_HANDLE, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
-    for (size_t i = 0; i < infos.size(); i++) {
-        const TableContents::Entry& entry = contents.entries[i];
-        if (!entry.object) continue;
-        auto& texture = *static_cast<VulkanTexture*>(entry.object->native.get());
-        Slice slice = entry.slice;
-        const VkImageViewType type = viewType(dimension, texture, slice);
-        Expected<VkImageView> view = texture.view(slice, type, mainAspect(texture.desc().format));
-        if (!view) return view.error();
-        infos[i].imageView = *view;
+void TableSets::release(const Set& set) {
+    VkDescriptorPool oldest = VK_NULL_HANDLE;
+    {
+        std::lock_guard lock(mutex_);
+        if (free_.size() == most_free) {
+            oldest = free_.front().pool;
+            free_.erase(free_.begin());
+        }
+        free_.push_back(set);
     }
-    VkWriteDescriptorSet write = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
-    write.dstSet = set;
-    write.dstBinding = layout.bindings[0].binding;
-    write.descriptorCount = static_cast<uint32_t>(infos.size());
-    write.descriptorType = VK_DESCRIPTOR_TYPE_SAMPLED_IMAGE;
-    write.pImageInfo = infos.data();
-    device_.vk.UpdateDescriptorSets(device_.handle, 1, &write, 0, nullptr);
-    return {};
+    if (oldest) device_.vk.DestroyDescriptorPool(device_.handle, oldest, nullptr);
 }
 
-void VulkanTable::writeBuffers(VkDescriptorSet set, const SetLayout& layout, const TableContents& contents) {
-    std::vector<VkDescriptorBufferInfo> infos(contents.entries.size(), {VK_NULL_HANDLE, 0, VK_WHOLE_SIZE});
-    for (size_t i = 0; i < infos.size(); i++) {
+VulkanTable::~VulkanTable() {
+    for (const Set& each : sets_) device_.tables.release(each.set);
+}
+
+Expected<VkDescriptorSet> VulkanTable::set(const SetLayout& layout, const LayoutElement& element,
+                                           const TableContents& contents) {
+    for (const Set& known : sets_) {
+        if (known.set.layout == layout.handle && known.dimension == element.dimension) return known.set.handle;
+    }
+    const Expected<TableSets::Set> made =
+        device_.tables.acquire(layout.handle, element.type, static_cast<uint32_t>(contents.entries.size()));
+    if (!made) return unexpected(made.error().named(name_));
+    if (Status status = write(made->handle, layout.bindings[0].binding, element, contents); !status) {
+        device_.tables.release(*made);
+        return unexpected(status.error().named(name_));
+    }
+    sets_.push_back({*made, element.dimension});
+    return made->handle;
+}
+
+Status VulkanTable::write(VkDescriptorSet set, uint32_t binding, const LayoutElement& element,
+                          const TableContents& contents) {
+    // Without an object it is a null descriptor, which reads as 0.
+    const size_t count = contents.entries.size();
+    const bool is_buffer = contents.element == SlotKind::Storage;
+    std::vector<VkDescriptorBufferInfo> buffers(is_buffer ? count : 0, {VK_NULL_HANDLE, 0, VK_WHOLE_SIZE});
+    std::vector<VkDescriptorImageInfo> images(
+        is_buffer ? 0 : count, {VK_NULL_HANDLE, VK_NULL_HANDLE, VK_IMAGE_LAYOUT_SHADER_READ_ONLY_OPTIMAL});
+    for (size_t i = 0; i < count; i++) {
         const TableContents::Entry& entry = contents.entries[i];
         if (!entry.object) continue;
-        infos[i] = {static_cast<VulkanBuffer*>(entry.object->native.get())->handle(), entry.offset, entry.size};
+        if (is_buffer) {
+            buffers[i] = {static_cast<VulkanBuffer*>(entry.object->native.get())->handle(), entry.offset, entry.size};
+            continue;
+        }
+        auto& texture = *static_cast<VulkanTexture*>(entry.object->native.get());
+        Slice slice = entry.slice;
+        const VkImageViewType type = viewType(element.dimension, texture, slice);
+        Expected<VkImageView> view = texture.view(slice, type, mainAspect(texture.desc().format));
+        if (!view) return view.error();
+        images[i].imageView = *view;
     }
     VkWriteDescriptorSet write = {VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET};
     write.dstSet = set;
-    write.dstBinding = layout.bindings[0].binding;
-    write.descriptorCount = static_cast<uint32_t>(infos.size());
-    write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-    write.pBufferInfo = infos.data();
+    write.dstBinding = binding;
+    write.descriptorCount = static_cast<uint32_t>(count);
+    write.descriptorType = element.type;
+    write.pImageInfo = images.data();
+    write.pBufferInfo = buffers.data();
     device_.vk.UpdateDescriptorSets(device_.handle, 1, &write, 0, nullptr);
+    return {};
 }
 
 }  // namespace glint::vulkan

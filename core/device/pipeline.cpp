@@ -4,6 +4,7 @@
 #include <glint/device/detail/device_object.h>
 
 #include <algorithm>
+#include <optional>
 
 namespace glint {
 
@@ -154,7 +155,7 @@ Error PipelineObject::checkState(const PipelineDesc& complete, Where where) cons
     if (complete.depth_test && !depth.depth)
         return problem(where, ErrorCode::InvalidArgument, "pipeline.depth",
                        "there is a depth test and no depth format");
-    if (complete.stencil_test && !depth.stencil)
+    if (complete.hasStencilTest() && !depth.stencil)
         return problem(where, ErrorCode::InvalidArgument, "pipeline.stencil",
                        fmt::format("there is a stencil test, the depth format {} has no stencil", depth.name));
     if (complete.fill == FillMode::Line)
@@ -238,6 +239,21 @@ bool checkIndex(PipelineObject& pipeline, uint32_t index, Pipeline::Where where)
     fail(pipeline, where, ErrorCode::OutOfRange, "pipeline.target",
          fmt::format("colour target {}, the device has {}", index, limit));
     return false;
+}
+
+/// Nothing, and the error is kept, if a value is none of its type.
+std::optional<detail::StencilFace> stencilFace(PipelineObject& pipeline, Pipeline::DepthFunc func,
+                                               Pipeline::StencilOp fail, Pipeline::StencilOp depth_fail,
+                                               Pipeline::StencilOp pass, Pipeline::Where where) {
+    detail::StencilFace face;
+    if (func == Pipeline::DepthFuncNone) return face;
+    face.test = true;
+    if (!convert(pipeline, face.compare, func, Pipeline::DepthFuncAlways, where) ||
+        !convert(pipeline, face.fail, fail, Pipeline::StencilOpDecrSat, where) ||
+        !convert(pipeline, face.depth_fail, depth_fail, Pipeline::StencilOpDecrSat, where) ||
+        !convert(pipeline, face.pass, pass, Pipeline::StencilOpDecrSat, where))
+        return std::nullopt;
+    return face;
 }
 
 detail::BlendDesc* blendOf(PipelineObject* pipeline, uint32_t index, Pipeline::Where where) {
@@ -359,19 +375,22 @@ void Pipeline::setDepthClamp(bool enabled, Where where) {
     if (PipelineObject* pipeline = configurable(object_, where)) pipeline->desc.depth_clamp = enabled;
 }
 
-void Pipeline::setStencilFunc(DepthFunc func, StencilOp fail_op, StencilOp depth_fail, StencilOp pass, Where where) {
+void Pipeline::setStencilFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass, Where where) {
     PipelineObject* pipeline = configurable(object_, where);
-    if (!pipeline) return;
-    detail::PipelineDesc& desc = pipeline->desc;
-    desc.stencil_test = func != DepthFuncNone;
-    if (func == DepthFuncNone) return;
-    detail::StencilFace face;
-    if (!convert(*pipeline, face.compare, func, DepthFuncAlways, where) ||
-        !convert(*pipeline, face.fail, fail_op, StencilOpDecrSat, where) ||
-        !convert(*pipeline, face.depth_fail, depth_fail, StencilOpDecrSat, where) ||
-        !convert(*pipeline, face.pass, pass, StencilOpDecrSat, where))
-        return;
-    desc.stencil_front = desc.stencil_back = face;
+    const auto face = pipeline ? stencilFace(*pipeline, func, fail, depth_fail, pass, where) : std::nullopt;
+    if (face) pipeline->desc.stencil_front = pipeline->desc.stencil_back = *face;
+}
+
+void Pipeline::setStencilFrontFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass, Where where) {
+    PipelineObject* pipeline = configurable(object_, where);
+    const auto face = pipeline ? stencilFace(*pipeline, func, fail, depth_fail, pass, where) : std::nullopt;
+    if (face) pipeline->desc.stencil_front = *face;
+}
+
+void Pipeline::setStencilBackFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass, Where where) {
+    PipelineObject* pipeline = configurable(object_, where);
+    const auto face = pipeline ? stencilFace(*pipeline, func, fail, depth_fail, pass, where) : std::nullopt;
+    if (face) pipeline->desc.stencil_back = *face;
 }
 
 void Pipeline::setStencilMask(uint8_t read, uint8_t write, Where where) {

@@ -126,8 +126,17 @@ public:
     void setDepthBias(float bias, float slope, Where where = Where::current());
     /// Fragments beyond the depth range are kept, their depth clamped; needs FeatureDepthClamp.
     void setDepthClamp(bool enabled, Where where = Where::current());
+    /// The stencil test of both faces: `reference FUNC stored`, and what happens to what is stored. DepthFuncNone: no
+    /// test.
     void setStencilFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass,
                         Where where = Where::current());
+    /// The same of front faces, or of back faces, alone (points and lines are front faces). Of a face without a test
+    /// all fragments pass and nothing is stored.
+    void setStencilFrontFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass,
+                             Where where = Where::current());
+    void setStencilBackFunc(DepthFunc func, StencilOp fail, StencilOp depth_fail, StencilOp pass,
+                            Where where = Where::current());
+    /// Bits that are compared and bits that are stored, of both faces.
     void setStencilMask(uint8_t read, uint8_t write, Where where = Where::current());
     /// Blending of all colour targets, colour and alpha alike.
     void setBlend(BlendOp op, BlendFunc source, BlendFunc destination, Where where = Where::current());

@@ -159,7 +159,7 @@ Expected<std::unique_ptr<VulkanPipeline>> VulkanPipeline::create(VulkanDevice& d
     depth.depthTestEnable = desc.depth_test || desc.depth_write;
     depth.depthWriteEnable = desc.depth_write;
     depth.depthCompareOp = desc.depth_test ? vulkanCompare(desc.depth_compare) : VK_COMPARE_OP_ALWAYS;
-    depth.stencilTestEnable = desc.stencil_test;
+    depth.stencilTestEnable = desc.hasStencilTest();
     depth.front = stencilState(desc.stencil_front, desc);
     depth.back = stencilState(desc.stencil_back, desc);
 

@@ -98,6 +98,64 @@ TEST_F(OutputTest, WhichStencilOperation) {
     EXPECT_TRUE(isStencil(10));
 }
 
+TEST_F(OutputTest, EachFaceHasAStencilOfItsOwn) {
+    // The front face to the left, the back face to the right.
+    constexpr const char* two_faces = R"(
+        void main() {
+            int corner = gl_VertexIndex % 6, side = gl_VertexIndex / 6;
+            vec2 p = vec2(corner == 1 || corner == 2 || corner == 4, corner == 2 || corner == 4 || corner == 5);
+            if (side == 1) p.x = 1.0 - p.x;
+            gl_Position = vec4(p.x - 1.0 + float(side), p.y * 2.0 - 1.0, 0.5, 1.0);
+        })";
+    using P = Pipeline;
+    struct Case {
+        std::function<void(Pipeline&)> configure;
+        uint32_t left, right;
+    };
+    const auto keep = P::StencilOpKeep;
+    const Case cases[] = {
+        {[=](Pipeline& p) {
+             p.setStencilFrontFunc(P::DepthFuncAlways, keep, keep, P::StencilOpIncrSat);
+             p.setStencilBackFunc(P::DepthFuncAlways, keep, keep, P::StencilOpDecrSat);
+         },
+         8, 6},
+        {[=](Pipeline& p) {
+             p.setStencilFrontFunc(P::DepthFuncEqual, P::StencilOpZero, keep, P::StencilOpInvert);
+             p.setStencilBackFunc(P::DepthFuncNotEqual, P::StencilOpZero, keep, P::StencilOpInvert);
+         },
+         0xf8, 0},
+        {[=](Pipeline& p) { p.setStencilBackFunc(P::DepthFuncAlways, keep, keep, P::StencilOpZero); }, 7, 0},
+        {[=](Pipeline& p) {
+             p.setStencilFunc(P::DepthFuncAlways, keep, keep, P::StencilOpZero);
+             p.setStencilBackFunc(P::DepthFuncNone, keep, keep, P::StencilOpZero);
+         },
+         0, 7},
+    };
+    for (const Case& c : cases) {
+        SCOPED_TRACE(&c - cases);
+        const Pipeline pipeline = makePipeline(two_faces, red_fragment, [&](Pipeline& p) {
+            p.setDepthFormat(stencil_format);
+            c.configure(p);
+        });
+        Target target = device.createTarget(color, depth);
+        target.setClearDepth(1, 7);
+        Command list = device.createCommand(target);
+        list.setPipeline(pipeline);
+        list.setStencilRef(7);
+        list.drawArrays(12);
+        submit(list);
+        const auto equals = [&](uint32_t value, uint32_t side) {
+            isStencil(value);
+            const std::vector<Pixel> picture = readTexture<Pixel>(color);
+            for (uint32_t i = 0; i < size * size; i++)
+                if (i % size / 2 == side && picture[i] != red) return false;
+            return true;
+        };
+        EXPECT_TRUE(equals(c.left, 0));
+        EXPECT_TRUE(equals(c.right, 1));
+    }
+}
+
 TEST_F(OutputTest, StencilMasks) {
     const Pipeline pipeline = covering([](Pipeline& p) {
         p.setStencilFunc(Pipeline::DepthFuncAlways, Pipeline::StencilOpKeep, Pipeline::StencilOpKeep,

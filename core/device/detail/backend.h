@@ -146,6 +146,7 @@ struct BlendDesc {
 };
 
 struct StencilFace {
+    bool test = false;  ///< without it, a face passes if the other one is tested
     Compare compare = Compare::Always;
     StencilOperation fail = StencilOperation::Keep;
     StencilOperation depth_fail = StencilOperation::Keep;
@@ -167,8 +168,8 @@ struct PipelineDesc {
     bool depth_test = false;
     bool depth_write = false;
     Compare depth_compare = Compare::Always;
-    bool stencil_test = false;
     StencilFace stencil_front, stencil_back;
+    bool hasStencilTest() const { return stencil_front.test || stencil_back.test; }
     uint8_t stencil_read_mask = 0xff, stencil_write_mask = 0xff;
     std::vector<Format> color_formats;
     std::vector<BlendDesc> blends;  ///< one for each colour format

@@ -36,6 +36,10 @@ void Command::setScissor(int32_t x, int32_t y, uint32_t width, uint32_t height) 
     if (core_) core_->setScissor({x, y, width, height});
 }
 
+void Command::setScissors(std::span<const Scissor> scissors, Where where) {
+    if (core_) core_->setScissors(scissors, where);
+}
+
 void Command::setBlendFactor(const Color& color) {
     if (core_) core_->setBlendFactor(color);
 }

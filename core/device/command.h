@@ -37,12 +37,17 @@ public:
     void setViewport(float x, float y, float width, float height, float minimum_depth = 0.0f,
                      float maximum_depth = 1.0f);
     /// Several, chosen by gl_ViewportIndex, which vertex (FeatureVertexLayer), geometry and mesh shaders write: at most
-    /// Features::maxViewports, more than one with FeatureMultiViewport ("draw.viewports"). The scissor cuts them all.
+    /// Features::maxViewports, more than one with FeatureMultiViewport ("draw.viewports"). One scissor cuts them all.
     void setViewports(std::span<const Viewport> viewports, Where where = Where::current());
     void setViewports(std::initializer_list<Viewport> viewports, Where where = Where::current()) {
         setViewports(std::span(viewports.begin(), viewports.size()), where);
     }
     void setScissor(int32_t x, int32_t y, uint32_t width, uint32_t height);
+    /// One for each viewport: as many as there are viewports when something is drawn ("draw.scissors").
+    void setScissors(std::span<const Scissor> scissors, Where where = Where::current());
+    void setScissors(std::initializer_list<Scissor> scissors, Where where = Where::current()) {
+        setScissors(std::span(scissors.begin(), scissors.size()), where);
+    }
     /// Constant of BlendFuncFactor.
     void setBlendFactor(const Color& color);
     void setStencilRef(uint32_t reference);

@@ -37,6 +37,12 @@ struct Viewport {
     float x = 0, y = 0, width = 0, height = 0, minimum_depth = 0, maximum_depth = 1;
 };
 
+/// What is drawn of a target: pixels from its top left corner. What lies outside of the target does not matter.
+struct Scissor {
+    int32_t x = 0, y = 0;
+    uint32_t width = 0, height = 0;
+};
+
 /// Comparison for depth, stencil and comparing samplers: passes if `new FUNC old`.
 enum class Compare : uint8_t { Never, Less, Equal, LessEqual, Greater, NotEqual, GreaterEqual, Always };
 

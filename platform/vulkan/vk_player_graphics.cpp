@@ -127,12 +127,14 @@ bool Player::attach(const Attachment& attachment, bool is_depth, bool is_first, 
 void Player::setDynamicState(const DynamicState& state) {
     // Negative height turns clip space's +Y up; see vk_pipeline.cpp.
     const auto* from = state.viewport_count > 1 ? list_->at<Viewport>(state.viewports) : &state.viewport;
+    const auto* scissor = state.scissor_count > 1 ? list_->at<Scissor>(state.scissors) : &state.scissor;
     VkViewport viewports[max_viewports];
     VkRect2D scissors[max_viewports];
     for (uint32_t i = 0; i < state.viewport_count; i++, from++) {
         viewports[i] = {from->x,       from->y + from->height, from->width,
                         -from->height, from->minimum_depth,    from->maximum_depth};
-        scissors[i] = {{state.scissor.x, state.scissor.y}, {state.scissor.width, state.scissor.height}};
+        scissors[i] = {{scissor->x, scissor->y}, {scissor->width, scissor->height}};
+        if (state.scissor_count > 1) scissor++;
     }
     vk_.CmdSetViewportWithCount(commands_, state.viewport_count, viewports);
     vk_.CmdSetScissorWithCount(commands_, state.viewport_count, scissors);

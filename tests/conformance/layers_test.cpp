@@ -200,6 +200,30 @@ TEST_P(LayersTest, ViewportsByIndex) {
                 << x << ", " << y;
 }
 
+TEST_P(LayersTest, AScissorForEachViewport) {
+    GLINT_NEED_FEATURE(FeatureMultiViewport);
+    const Texture color = makeTexture(FormatRGBAu8n, 24, 8);
+    const Pipeline pipeline = numbered("gl_ViewportIndex");
+    std::vector<Viewport> viewports(6, {.width = 24, .height = 8});
+    std::vector<Scissor> scissors;
+    for (int32_t i = 0; i < 6; i++) scissors.push_back({4 * i - 2, i - 2, 4, 6});
+    draw(color, [&](Command& list) {
+        list.setPipeline(pipeline);
+        list.setScissors(scissors);
+        list.setViewports(viewports);
+        drawAll(list);
+    });
+    const std::vector<Pixel> picture = readTexture<Pixel>(color);
+    for (int32_t y = 0; y < 8; y++)
+        for (int32_t x = 0; x < 24; x++) {
+            const int32_t i = (x + 2) / 4;
+            const bool inside = i < 6 && y >= i - 2 && y < i + 4;
+            EXPECT_EQ(picture[static_cast<size_t>(y * 24 + x)],
+                      inside ? numberColor(static_cast<uint32_t>(i) + 1) : black)
+                << x << ", " << y;
+        }
+}
+
 TEST_P(LayersTest, OneViewportAgainAfterSeveral) {
     GLINT_NEED_FEATURE(FeatureMultiViewport);
     const Texture color = makeTexture(FormatRGBAu8n, size, size);
@@ -208,7 +232,9 @@ TEST_P(LayersTest, OneViewportAgainAfterSeveral) {
         list.setPipeline(cover);
         list.setViewports({{.width = 2, .height = 2}, {.x = 4, .y = 4, .width = 2, .height = 2}});
         list.drawArrays(3);
+        list.setScissors({{0, 0, 1, 1}, {0, 0, 1, 1}});
         list.setViewport(6, 6, 2, 2);
+        list.setScissor(0, 0, size, size);
         list.drawArrays(3);
     });
     const std::vector<Pixel> picture = readTexture<Pixel>(color);

@@ -101,6 +101,23 @@ MISUSE(CountedArgumentsBeyondTheEnd, "draw.indirect") {
 
 // Viewports.
 
+MISUSE(ScissorsOfNone, "draw.scissors") {
+    return kit.command([](Command& list) { list.setScissors({}); });
+}
+MISUSE(ScissorsOfMany, "draw.scissors") {
+    const std::vector<Scissor> scissors(kit.device.getFeatures().maxViewports + 1, {0, 0, 1, 1});
+    return kit.command([&](Command& list) { list.setScissors(scissors); });
+}
+MISUSE(ScissorsUnlikeViewports, "draw.scissors") {
+    if (kit.device.getFeatures().maxViewports < 3) return kit.command([](Command& list) { list.setScissors({}); });
+    const Pipeline pipeline = kit.pipeline();
+    return kit.command([&](Command& list) {
+        list.setPipeline(pipeline);
+        list.setViewports({{.width = 1, .height = 1}, {.width = 1, .height = 1}, {.width = 1, .height = 1}});
+        list.setScissors({{0, 0, 1, 1}, {0, 0, 1, 1}});
+        list.drawArrays(3);
+    });
+}
 MISUSE(ViewportsOfNone, "draw.viewports") { return viewed(kit, {}); }
 MISUSE(ViewportsOfMany, "draw.viewports") {
     return viewed(kit, std::vector<Viewport>(kit.device.getFeatures().maxViewports + 1, {.width = 8, .height = 8}));

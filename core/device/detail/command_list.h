@@ -231,11 +231,6 @@ struct VertexBinding {
     uint64_t offset = 0;
 };
 
-struct Scissor {
-    int32_t x = 0, y = 0;
-    uint32_t width = 0, height = 0;
-};
-
 /// State of a draw. Offsets as in Bindings; an inline vertex or index buffer has resource none and its offset is into
 /// the inline data.
 struct DrawState {
@@ -253,7 +248,9 @@ struct DynamicState {
     Viewport viewport;
     uint32_t viewports = none;  ///< byte offset in CommandList::bytes of the array of Viewport, if there are several
     uint32_t viewport_count = 1;
-    Scissor scissor;  ///< of all viewports
+    Scissor scissor;
+    uint32_t scissors = none;  ///< likewise of Scissor, one for each viewport, if there are several
+    uint32_t scissor_count = 1;
     float blend[4] = {0, 0, 0, 0};
     uint32_t stencil_reference = 0;
 };

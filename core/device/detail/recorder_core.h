@@ -111,6 +111,7 @@ public:
     void setViewport(const Viewport& viewport);
     void setViewports(std::span<const Viewport> viewports, Where where);
     void setScissor(const Scissor& scissor);
+    void setScissors(std::span<const Scissor> scissors, Where where);
     void setBlendFactor(const Color& color);
     void setStencilRef(uint32_t reference);
     void draw(bool indexed, uint32_t count, uint32_t instances, uint32_t first, int32_t base_vertex,

@@ -5,6 +5,21 @@
 
 namespace glint::detail {
 
+namespace {
+
+/// Vulkan: offsets are not negative and offset + extent does not overflow.
+Scissor clipped(const Scissor& scissor) {
+    const int64_t left = std::max(scissor.x, 0);
+    const int64_t top = std::max(scissor.y, 0);
+    const int64_t right = std::min<int64_t>(static_cast<int64_t>(scissor.x) + scissor.width, INT32_MAX);
+    const int64_t bottom = std::min<int64_t>(static_cast<int64_t>(scissor.y) + scissor.height, INT32_MAX);
+    return {static_cast<int32_t>(left), static_cast<int32_t>(top),
+            static_cast<uint32_t>(std::max<int64_t>(right - left, 0)),
+            static_cast<uint32_t>(std::max<int64_t>(bottom - top, 0))};
+}
+
+}  // namespace
+
 void RecorderCore::beginTarget(TargetObject& target, Where where) {
     graphics_ = true;
     const TargetObject::Attachment* attachments[max_targets + 1];
@@ -206,15 +221,22 @@ bool RecorderCore::checkViewport(const Viewport& viewport, Where where) {
 }
 
 void RecorderCore::setScissor(const Scissor& scissor) {
-    dynamic_.scissor = scissor;
-    // Vulkan: offsets are not negative and offset + extent does not overflow.
-    const int64_t left = std::max(scissor.x, 0);
-    const int64_t top = std::max(scissor.y, 0);
-    const int64_t right = std::min<int64_t>(static_cast<int64_t>(scissor.x) + scissor.width, INT32_MAX);
-    const int64_t bottom = std::min<int64_t>(static_cast<int64_t>(scissor.y) + scissor.height, INT32_MAX);
-    dynamic_.scissor = {static_cast<int32_t>(left), static_cast<int32_t>(top),
-                        static_cast<uint32_t>(std::max<int64_t>(right - left, 0)),
-                        static_cast<uint32_t>(std::max<int64_t>(bottom - top, 0))};
+    dynamic_.scissor = clipped(scissor);
+    dynamic_.scissor_count = 1;
+    dynamic_dirty_ = true;
+}
+
+void RecorderCore::setScissors(std::span<const Scissor> scissors, Where where) {
+    if (!recording(where)) return;
+    const uint32_t limit = device_->features().maxViewports;
+    if (scissors.empty() || scissors.size() > limit)
+        return fail(where, ErrorCode::OutOfRange, "draw.scissors", "setScissors: {} scissors of 1 to {}",
+                    scissors.size(), limit);
+    std::array<Scissor, max_viewports> all;
+    std::transform(scissors.begin(), scissors.end(), all.begin(), clipped);
+    dynamic_.scissor = all[0];
+    dynamic_.scissor_count = static_cast<uint32_t>(scissors.size());
+    dynamic_.scissors = append(all.data(), scissors.size_bytes());
     dynamic_dirty_ = true;
 }
 
@@ -241,6 +263,11 @@ bool RecorderCore::flushDraw(DrawKind kind, DrawState& state, Where where) {
         return false;
     }
     if (!checkViewport(dynamic_.viewport, where)) return false;
+    if (dynamic_.scissor_count > 1 && dynamic_.scissor_count != dynamic_.viewport_count) {
+        fail(where, ErrorCode::InvalidArgument, "draw.scissors", "draw: there are {} scissors and {} viewports",
+             dynamic_.scissor_count, dynamic_.viewport_count);
+        return false;
+    }
     const bool new_bindings = bindings_dirty_;
     if (!flushBindings("draw", where) || !flushPush("draw", where)) return false;
     if (new_bindings) {

@@ -89,15 +89,15 @@ double Times::median() const {
 
 double Times::minimum() const { return *std::min_element(values.begin(), values.end()); }
 
-std::vector<Times> interleave(std::span<const Side> sides, uint32_t warm_up, uint32_t rounds) {
+std::vector<Times> interleave(std::span<const Side> sides, uint32_t warm_up, uint32_t rounds, double (*clock)()) {
     std::vector<Times> times(sides.size());
     for (uint32_t round = 0; round < warm_up + rounds; round++) {
         for (size_t turn = 0; turn < sides.size(); turn++) {
             // To and fro, so that no side always finds the caches as the same other has left them.
             const size_t i = round % 2 == 0 ? turn : sides.size() - 1 - turn;
-            const double begin = threadSeconds();
+            const double begin = clock();
             sides[i].timed();
-            const double end = threadSeconds();
+            const double end = clock();
             sides[i].untimed();
             if (round >= warm_up) times[i].values.push_back(end - begin);
         }

@@ -62,6 +62,8 @@ struct Benchmark {
 Benchmark shaderCompileBenchmark();
 Benchmark dispatchBenchmark();
 Benchmark drawBenchmark();
+Benchmark mipmapBenchmark();
+Benchmark tableBenchmark();
 Benchmark warmFrameBenchmark();
 Benchmark tracingFrameBenchmark();
 Benchmark startupBenchmark();
@@ -119,8 +121,10 @@ struct Side {
     std::function<void()> untimed;  ///< after each timed part, such as the wait for the device
 };
 
-/// Runs all sides `warm_up` + `rounds` times, in turn and in reverse, and returns the calling thread's seconds of each.
-std::vector<Times> interleave(std::span<const Side> sides, uint32_t warm_up, uint32_t rounds);
+/// Runs all sides `warm_up` + `rounds` times, in turn and in reverse, and returns the seconds of each, by default those
+/// of the calling thread.
+std::vector<Times> interleave(std::span<const Side> sides, uint32_t warm_up, uint32_t rounds,
+                              double (*clock)() = threadSeconds);
 
 /// "label    median 1.234 ms  minimum 1.200 ms"
 void printTimes(std::string_view label, const Times& times);

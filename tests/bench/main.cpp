@@ -58,7 +58,7 @@ int main(int argc, char** argv) {
         traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),     parallelGpuBenchmark(),
         splatAccuracyBenchmark(),    splatLoadBenchmark(),       splatFilesBenchmark(),   splatTradeoffsBenchmark(),
         splatNeedlesBenchmark(),     splatSpeedBenchmark(),      splatGpuBenchmark(),     lodBenchmark(),
-        rasterBenchmark(),           rasterSceneBenchmark()};
+        rasterBenchmark(),           rasterSceneBenchmark(),     mipmapBenchmark(),       tableBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

@@ -185,13 +185,14 @@ RawBuffer RawDevice::createBuffer(VkDeviceSize size, VkBufferUsageFlags usage, b
     return result;
 }
 
-RawImage RawDevice::createImage(VkFormat format, uint32_t width, uint32_t height, VkImageUsageFlags usage) {
+RawImage RawDevice::createImage(VkFormat format, uint32_t width, uint32_t height, VkImageUsageFlags usage,
+                                uint32_t mips) {
     RawImage result = {.format = format, .width = width, .height = height};
     VkImageCreateInfo info = {VK_STRUCTURE_TYPE_IMAGE_CREATE_INFO};
     info.imageType = VK_IMAGE_TYPE_2D;
     info.format = format;
     info.extent = {width, height, 1};
-    info.mipLevels = 1;
+    info.mipLevels = mips;
     info.arrayLayers = 1;
     info.samples = VK_SAMPLE_COUNT_1_BIT;
     info.tiling = VK_IMAGE_TILING_OPTIMAL;

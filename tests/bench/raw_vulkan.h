@@ -82,6 +82,8 @@ namespace glint::bench {
     X(CmdBindVertexBuffers)           \
     X(CmdDraw)                        \
     X(CmdClearColorImage)             \
+    X(CmdBlitImage)                   \
+    X(CmdCopyBufferToImage)           \
     X(CmdCopyImageToBuffer)           \
     X(CmdCopyBuffer)                  \
     X(CreateQueryPool)                \
@@ -171,7 +173,8 @@ public:
     const VkPhysicalDeviceLimits& limits() const { return properties_.limits; }
 
     RawBuffer createBuffer(VkDeviceSize size, VkBufferUsageFlags usage, bool host);
-    RawImage createImage(VkFormat format, uint32_t width, uint32_t height, VkImageUsageFlags usage);
+    /// The view is of the first mip level.
+    RawImage createImage(VkFormat format, uint32_t width, uint32_t height, VkImageUsageFlags usage, uint32_t mips = 1);
     VkSampler createSampler();
     RawProgram createKernel(std::span<const uint32_t> words, std::span<const VkDescriptorSetLayoutBinding> bindings);
     RawProgram createPipeline(const RawGraphics& desc);

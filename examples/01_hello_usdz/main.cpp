@@ -199,7 +199,9 @@ int main(int argc, char** argv) {
         if (Status posed = model.setPose(is_at_rest ? scene->pose() : scene->pose(animation, time)); !posed)
             return posed;
 
-        const Vector3f from = frame.view.eye(Vector3f(0.55f, -1.05f, 1.05f) * radius, {0, 0, 0});
+        // Koi are seen from above, a model of a file from before it.
+        const Vector3f way = path.empty() ? Vector3f(0.12f, -0.62f, 0.95f) : Vector3f(0.7f, -1.7f, 0.6f);
+        const Vector3f from = frame.view.eye(way * radius, {0, 0, 0});
         const Camera camera = Camera()
                                   .lookAt(centre + toScene(from), centre, {0, 1, 0})
                                   .perspective(60.0f, frame.aspect(), radius * 1e-2f);

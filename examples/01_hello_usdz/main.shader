@@ -98,7 +98,7 @@ layout(location = 0) out vec4 light;
 
 const float pi = 3.14159265;
 const vec3 sun_direction = vec3(0.42, 0.84, 0.34);
-const vec3 sun = vec3(3.1, 2.9, 2.6);
+const vec3 sun = vec3(2.7, 2.5, 2.25);
 
 // The material is the same for the whole draw, so no texture's derivatives are of a branch that some pixels leave out.
 vec4 readMap(texture2D map, sampler how, Use use, vec4 without) {

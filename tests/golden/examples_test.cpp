@@ -46,6 +46,13 @@ TEST(Golden, TriangleTurned) {
     expectGolden("00_hello_triangle", "--size 128x72 --time 0.5", "00_hello_triangle_turned", {.texels = 30});
 }
 
+// Four samples a pixel: where an edge moves by a part of 256, one of them falls to its other side, in a pixel of fifty;
+// and levels of textures differ by their filters' 8 bits. One pixel in a hundred may.
+TEST(Golden, Koi) {
+    expectGolden("01_hello_usdz", "--size 160x90 --time 3", "01_hello_usdz", {.texels = 144});
+    expectGolden("01_hello_usdz", "--size 160x90 --time 5.25", "01_hello_usdz_later", {.texels = 144});
+}
+
 // Particles blend from the farthest to the nearest, in half floats: each layer rounds by at most 2^-11 of the sum and
 // hides its share of the errors behind it, so that tens of layers stay below 1 of 255; where devices round positions
 // differently, edges of particles fall to other pixels, for which one in a hundred is allowed.

@@ -33,7 +33,7 @@ void collect(const std::string& text, const std::set<std::string>& groups, const
             ids.emplace((*match)[1].str() + "." + (*match)[2].str(), place);
 }
 
-/// Calls visit(code, comment, place) for each line of the sources.
+/// Calls visit(code, comment, place) for each line of the sources that quotes something.
 template <class Visit>
 void forEachLine(Visit&& visit) {
     for (const char* folder : {"core", "platform"})
@@ -42,12 +42,14 @@ void forEachLine(Visit&& visit) {
             if (extension != ".h" && extension != ".cpp") continue;
             const Expected<std::string> text = readTextFile(entry.path());
             ASSERT_TRUE(text) << text.error().text();
+            const std::string name = std::filesystem::relative(entry.path(), root).string() + ":";
             std::istringstream lines(*text);
             std::string line;
             for (int number = 1; std::getline(lines, line); number++) {
+                if (line.find('"') == std::string::npos) continue;
                 const size_t comment = line.find("//");
                 visit(line.substr(0, comment), comment == std::string::npos ? std::string() : line.substr(comment),
-                      std::filesystem::relative(entry.path(), root).string() + ":" + std::to_string(number));
+                      name + std::to_string(number));
             }
         }
 }

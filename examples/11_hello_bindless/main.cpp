@@ -5,8 +5,10 @@
 
 #include <glint/math/camera.h>
 
+#include <algorithm>
 #include <array>
 #include <cstdio>
+#include <functional>
 #include <map>
 
 using namespace glint;
@@ -33,7 +35,7 @@ struct TextureUse {
 };
 
 struct alignas(16) Material {
-    Vector4f base_color = {1, 1, 1, 1};
+    Vector4f base_color = {1, 1, 1, 1};  ///< of a mask, alpha is over the cutoff: 1 and more is seen
     TextureUse color_use, normal_use, surface_use;
     float metallic = 0.0f;
     float roughness = 1.0f;
@@ -141,9 +143,6 @@ int main(int argc, char** argv) {
     if (!scene) return report(scene.error());
     Device device = openDevice(example, FeatureComputeTracing | FeatureTextureTable);
     if (!device) return report(device.error());
-    Kernel kernel = device.createKernel("trace");
-    kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader");
-    if (!kernel.create()) return report(kernel.error());
 
     // Geometry, textures and materials.
     const Triangles triangles = gather(*scene);
@@ -151,11 +150,21 @@ int main(int argc, char** argv) {
     Textures textures(device, *scene);
     std::vector<Material> materials;
     std::vector<uint32_t> indices;
-    for (size_t i = 0; i < scene->materials.size(); i++) {
-        if (triangles.indices[i].empty()) continue;
+    // Masks come last: a structure of their own shows their hits to the shader, one by one.
+    const auto is_mask = [&](size_t i) {
+        const SceneMaterial& material = scene->materials[i];
+        return material.alpha == SceneAlpha::Mask && material.alpha_cutoff > 0.0f;
+    };
+    std::vector<size_t> order;
+    for (size_t i = 0; i < scene->materials.size(); i++)
+        if (!triangles.indices[i].empty()) order.push_back(i);
+    const auto first_mask =
+        static_cast<uint32_t>(std::stable_partition(order.begin(), order.end(), std::not_fn(is_mask)) - order.begin());
+    for (const size_t i : order) {
         const SceneMaterial& from = scene->materials[i];
         Material& material = materials.emplace_back();
         material.base_color = from.base_color;
+        if (is_mask(i)) material.base_color.w /= from.alpha_cutoff;
         material.color_use = textures.use(from.base_color_texture, true);
         material.normal_use = textures.use(from.normal_texture, false);
         material.surface_use = textures.use(from.metallic_roughness_texture, false);
@@ -172,20 +181,34 @@ int main(int argc, char** argv) {
     const Sampler sampler =
         device.createSampler({.filter = Sampler::FilterTrilinear, .wrap = Sampler::WrapModeRepeat}, "trilinear");
 
-    // One structure, a geometry for each material.
-    Tracing model = device.createTracing("model");
-    for (size_t i = 0; i < materials.size(); i++) {
-        const uint32_t first = materials[i].first_index;
-        const size_t end = i + 1 < materials.size() ? materials[i + 1].first_index : indices.size();
-        model.addVertexBuffer(static_cast<uint32_t>(triangles.vertices.size()), FormatRGBf32, sizeof(Vertex),
-                              vertex_buffer);
-        model.addIndexBuffer(static_cast<uint32_t>(end - first), FormatRu32, index_buffer, first * sizeof(uint32_t));
+    // A geometry for each material; an instance says the number of its first one.
+    Tracing parts[2];
+    std::vector<Tracing::Instance> instances;
+    std::vector<Tracing> structures;
+    const auto count = static_cast<uint32_t>(materials.size());
+    for (const auto& [begin, end] : {std::pair(0u, first_mask), {first_mask, count}}) {
+        if (begin == end) continue;
+        Tracing& part = parts[instances.size()] = device.createTracing(begin < first_mask ? "model" : "masks");
+        for (uint32_t i = begin; i < end; i++) {
+            const uint32_t first = materials[i].first_index;
+            const size_t last = i + 1 < count ? materials[i + 1].first_index : indices.size();
+            part.addVertexBuffer(static_cast<uint32_t>(triangles.vertices.size()), FormatRGBf32, sizeof(Vertex),
+                                 vertex_buffer);
+            part.addIndexBuffer(static_cast<uint32_t>(last - first), FormatRu32, index_buffer,
+                                first * sizeof(uint32_t));
+        }
+        Tracing::Flags form = Tracing::FlagCompact | Tracing::FlagFastTrace;
+        if (begin == first_mask) form |= Tracing::FlagTransparent;
+        if (Status status = part.create(Tracing::TypeTriangle, form); !status) return report(status.error());
+        instances.push_back({.tracing = &part, .data = begin});
+        structures.push_back(part);
     }
-    if (Status status = model.create(Tracing::TypeTriangle, Tracing::FlagCompact | Tracing::FlagFastTrace); !status)
-        return report(status.error());
-    const Tracing top = device.createTracing({Tracing::Instance{.tracing = &model}});
-    if (Status status = device.buildTracings({model, top}, Tracing::FlagCompact); !status)
-        return report(status.error());
+    const Tracing top = device.createTracing(instances);
+    structures.push_back(top);
+    if (Status status = device.buildTracings(structures, Buffer(), Tracing::FlagCompact); !status) return report(status.error());
+    Kernel kernel = device.createKernel("trace");
+    kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader", first_mask < count ? "ALPHA_TEST=1" : "");
+    if (!kernel.create()) return report(kernel.error());
 
     // A file's scene is looked at from all around.
     Vector3f low(triangles.vertices[0].position), high = low;
@@ -235,7 +258,8 @@ int main(int argc, char** argv) {
                          {"materials", materials.size()},
                          {"textures", textures.count()},
                          {"texture_bytes", textures.bytes()},
-                         {"tracing_bytes", model.getMemory() + top.getMemory()}};
+                         {"masks", count - first_mask},
+                         {"tracing_bytes", parts[0].getMemory() + parts[1].getMemory() + top.getMemory()}};
     statistics.setRays("trace", 1ull * statistics.width * statistics.height);  // of the camera, and as many reflections
     std::printf("%zu triangles, %zu materials, %zu textures of %.1f MB in one table; %.1f ms to trace them\n",
                 indices.size() / 3, materials.size(), textures.count(), static_cast<double>(textures.bytes()) * 1e-6,

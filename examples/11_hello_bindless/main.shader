@@ -64,14 +64,38 @@ vec4 readTexture(TextureUse use, vec2 place, float footprint, vec4 without) {
     return textureLod(sampler2D(textures[nonuniformEXT(use.texture)], trilinear), uv, 0.5 * log2(max(texels, 1e-12)));
 }
 
+#ifdef ALPHA_TEST
+/// True if what a candidate hits is there: its alpha, over the cutoff, is 1 or more. The image as it is, no mip level of
+/// it: a mean of masks has holes where a leaf is narrow.
+bool isSeen(Material material, uint primitive, vec2 barycentrics) {
+    const uint corner = material.first_index + 3u * primitive;
+    const vec2 place = vertexPlace(indices[corner]) * (1.0 - barycentrics.x - barycentrics.y) +
+                       vertexPlace(indices[corner + 1u]) * barycentrics.x +
+                       vertexPlace(indices[corner + 2u]) * barycentrics.y;
+    return material.base_color.a * readTexture(material.color_use, place, 0.0, vec4(1.0)).a >= 1.0;
+}
+#endif
+
 /// The nearest hit; false if there is none. `cone`: the width of the pixel's cone where the ray begins.
 bool trace(vec3 origin, vec3 direction, float cone, out Hit hit) {
     rayQueryEXT query;
+#ifdef ALPHA_TEST
+    rayQueryInitializeEXT(query, scene, gl_RayFlagsNoneEXT, 0xff, origin, 0.0, direction, 1e6);
+    while (rayQueryProceedEXT(query)) {
+        const int first = rayQueryGetIntersectionInstanceCustomIndexEXT(query, false);
+        const Material material = materials[first + rayQueryGetIntersectionGeometryIndexEXT(query, false)];
+        if (isSeen(material, uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false)),
+                   rayQueryGetIntersectionBarycentricsEXT(query, false)))
+            rayQueryConfirmIntersectionEXT(query);
+    }
+#else
     rayQueryInitializeEXT(query, scene, gl_RayFlagsOpaqueEXT, 0xff, origin, 0.0, direction, 1e6);
     while (rayQueryProceedEXT(query)) {}
+#endif
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionNoneEXT) return false;
 
-    const Material material = materials[rayQueryGetIntersectionGeometryIndexEXT(query, true)];
+    const Material material = materials[rayQueryGetIntersectionInstanceCustomIndexEXT(query, true) +
+                                        rayQueryGetIntersectionGeometryIndexEXT(query, true)];
     const uint corner = material.first_index + 3u * uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
     const uvec3 triangle = uvec3(indices[corner], indices[corner + 1u], indices[corner + 2u]);
     const vec2 barycentrics = rayQueryGetIntersectionBarycentricsEXT(query, true);

@@ -1,6 +1,7 @@
 // The examples' pictures at small sizes against the stored ones, run as programs, with the validation layers on.
 
 #include "golden/render.h"
+#include "support/gltf_builder.h"
 #include "support/image_compare.h"
 
 #include <glint/base/file.h>
@@ -10,6 +11,7 @@
 #include <glint/geometry/primitives.h>
 
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include <cstdlib>
 
@@ -168,6 +170,54 @@ TEST(Golden, Course) {
     for (const char* name : {"20_normals", "21_diffuse", "22_phong", "23_shadows", "24_reflections"})
         for (const char* form : {"", " --query"})
             expectGolden(name, std::string("--size 160x90") + form, name, {.texels = 15});
+}
+
+// A white square whose mask is cut out on one half, and a blue one as large right below it.
+TEST(Golden, BindlessMasks) {
+    const TempDir folder;
+    std::vector<std::byte> texels(8 * 8 * 4, std::byte(255));
+    for (size_t i = 0; i < 64; i++)
+        if (i % 8 < 4) texels[i * 4 + 3] = std::byte(0);
+    const Expected<Image> mask = Image::create(FormatRGBAu8n, 8, 8, texels);
+    ASSERT_TRUE(mask && mask->save(folder / "mask.png"));
+    const auto render = [&](const nlohmann::json& alpha) {
+        GltfBuilder gltf;
+        gltf.json["images"] = {{{"uri", "mask.png"}}};
+        gltf.json["textures"] = {{{"source", 0}}};
+        nlohmann::json white = {
+            {"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}, {"metallicFactor", 0}}}};
+        white.update(alpha);
+        gltf.json["materials"] = {
+            white, {{"pbrMetallicRoughness", {{"baseColorFactor", {0, 0, 1, 1}}, {"metallicFactor", 0}}}}};
+        const int places = gltf.accessor(std::vector<float>{0, 0, 1, 0, 1, 1, 0, 0, 1, 1, 0, 1}, "VEC2");
+        for (int i = 0; i < 2; i++) {
+            const float y = i == 0 ? 0.01f : 0.0f;
+            const std::vector<float> square = {-1, y, -1, 1, y, -1, 1, y, 1, -1, y, -1, 1, y, 1, -1, y, 1};
+            const int mesh = gltf.mesh(square, {{"material", i}, {"attributes", {{"TEXCOORD_0", places}}}});
+            gltf.node({{"mesh", mesh}});
+        }
+        EXPECT_TRUE(writeTextFile(folder / "masks.gltf", gltf.text()));
+        const Expected<Image> image = renderExample(
+            "11_hello_bindless", "--size 96x54 --scene '" + (folder / "masks.gltf").string() + "'", folder);
+        EXPECT_TRUE(image) << image.error().text();
+        std::pair<int, int> count;  // white and blue pixels
+        for (size_t i = 0; image && i < image->bytes().size(); i += 4) {
+            const auto red = static_cast<int>(image->bytes()[i]), blue = static_cast<int>(image->bytes()[i + 2]);
+            if (red > 60) count.first++;
+            if (blue > red + 60) count.second++;
+        }
+        return count;
+    };
+    const auto [whole, hidden] = render({});
+    EXPECT_GT(whole, 300);
+    const auto [half, seen] = render({{"alphaMode", "MASK"}});
+    // The half next to the camera and the other one are within a third of each other; edges are a few pixels.
+    EXPECT_NEAR(half, whole / 2, whole / 6);
+    EXPECT_NEAR(half + seen, whole + hidden, whole / 20);
+    EXPECT_LT(hidden, whole / 20);
+    // All of it is below the cutoff, or nothing.
+    EXPECT_EQ(render({{"alphaMode", "MASK"}, {"alphaCutoff", 1.5}}).first, 0);
+    EXPECT_EQ(render({{"alphaMode", "MASK"}, {"alphaCutoff", 0}}).first, whole);
 }
 
 // Rays that graze an edge fall to either side, and devices filter textures with 8 bits of the place between texels,

@@ -50,7 +50,7 @@ struct DeviceState {
     uint32_t cut;
     uint32_t clips;
     uint32_t missing;
-    uint32_t reserved;
+    uint32_t polygons;
     uint32_t most_places;
     uint32_t most_clips;
     uint32_t is_crowded;
@@ -125,7 +125,7 @@ Status Rasterizer::State::create(Where where) {
     if (options.capacity < 16 || options.capacity > most_capacity)
         return fail("capacity", options.capacity, "within 16 and 2^22");
     is_cpu = device.getInfo().cpu;
-    if (!options.small_pixels) options.small_pixels = is_cpu ? 64 : 128;
+    if (!options.small_pixels) options.small_pixels = is_cpu ? 256 : 128;
     if (*options.small_pixels > 1024) return fail("small_pixels", *options.small_pixels, "at most 1024");
     is_wide = !options.narrow && device.getFeatures().has(FeatureAtomicBufferu64 | FeatureShaderu64);
     options.narrow = !is_wide;
@@ -156,8 +156,10 @@ Expected<Kernel> Rasterizer::State::kernel(std::string_view file, const std::str
     const std::string key = fmt::format("{} {}", file, macros);
     if (const auto found = kernels.find(key); found != kernels.end()) return found->second;
     Kernel made = device.createKernel(fmt::format("raster: {}", file), where);
-    made.createShaderGLSL(fmt::format("#include <glint/raster/{}.h>\n", file),
-                          fmt::format("GLINT_GROUP={}; GLINT_WIDE={}; {}", group, is_wide ? 1 : 0, macros), where);
+    made.createShaderGLSL(
+        fmt::format("#include <glint/raster/{}.h>\n", file),
+        fmt::format("GLINT_GROUP={}; GLINT_WIDE={}; GLINT_PEEK={}; {}", group, is_wide ? 1 : 0, is_cpu ? 0 : 1, macros),
+        where);
     if (Status status = made.create(where); !status) return unexpected(status.error());
     return kernels.emplace(key, std::move(made)).first->second;
 }
@@ -295,39 +297,49 @@ Status Rasterizer::State::drawClusters(Compute& compute, const MeshGraphModel& m
 }
 
 Status Rasterizer::State::record(Compute& compute, Frame frame, const Source& source, Where where) {
-    const auto play = [&](const char* file, int output, bool is_listing, uint32_t group, uint64_t groups) -> Status {
-        const Expected<Kernel> kernel =
-            this->kernel(file,
-                         fmt::format("GLINT_OUTPUT={}; GLINT_LIST={}; GLINT_CLUSTERS={}", output, is_listing ? 1 : 0,
-                                     source.is_clusters ? 1 : 0),
-                         group, where);
+    struct Pass {
+        const char* file;
+        std::string macros;
+        uint32_t group;
+        uint64_t groups;
+    };
+    const auto tiles = [&](int output, int polygons) {
+        return Pass{"tiles", fmt::format("GLINT_OUTPUT={}; GLINT_LIST=0; GLINT_POLYGONS={}", output, polygons),
+                    is_cpu ? 8u : 64u, is_cpu ? 256u : 4096u};
+    };
+    const auto draw = [&](int output, int list) {
+        return Pass{source.kernel, fmt::format("GLINT_OUTPUT={}; GLINT_LIST={}", output, list), source.group,
+                    source.groups};
+    };
+    const int output = options.output == OutputCounts ? 3 : is_wide ? 0 : 1;
+    std::vector<Pass> passes;
+    passes.push_back(draw(output, 1));
+    passes.push_back(
+        {"clip", fmt::format("GLINT_OUTPUT={}; GLINT_LIST=1; GLINT_CLUSTERS={}", output, source.is_clusters ? 1 : 0),
+         is_cpu ? 8u : 64u, is_cpu ? 32u : 256u});
+    if (!is_wide) passes.push_back({"sums", fmt::format("GLINT_OUTPUT={}", output), is_cpu ? 8u : 256u, 1});
+    passes.push_back(tiles(output, 0));
+    passes.push_back(tiles(output, 1));
+    if (output == 1) passes.insert(passes.end(), {draw(2, 0), tiles(2, 0), tiles(2, 1)});
+
+    compute.clearBuffer(state, 0, 0, draw_state, where);
+    for (const Pass& pass : passes) {
+        const Expected<Kernel> kernel = this->kernel(pass.file, pass.macros, pass.group, where);
         if (!kernel) return kernel.error();
         compute.setKernel(*kernel, where);
-        compute.setUniform(0, frame);
-        compute.setStorageBuffers(0, {state, picture, larges, clips});
-        for (size_t i = 0; i < source.buffers.size() && std::string_view(file) != "tiles" && file[0] != 's'; i++) {
-            const auto& [buffer, binding] = source.buffers[i];
-            if (std::string_view(file) == "clip" && i >= (source.is_clusters ? 5 : 2)) break;
-            compute.setStorageBuffer(static_cast<int>(4 + i), buffer, binding.offset, binding.size);
+        if (&pass == passes.data()) {
+            // They stay for the other kernels, which have the same slots or fewer.
+            compute.setUniform(0, frame);
+            compute.setStorageBuffers(0, {state, picture, larges, clips});
+            int slot = 4;
+            for (const auto& [buffer, binding] : source.buffers)
+                compute.setStorageBuffer(slot++, buffer, binding.offset, binding.size);
         }
         // In two dimensions where one has too few.
         constexpr uint64_t row = 32768;
-        compute.dispatch(std::min(groups, row) * group, divideUp(groups, row), 1, where);
-        return {};
-    };
-    compute.clearBuffer(state, 0, 0, draw_state, where);
-    const uint32_t few = is_cpu ? 8 : 64;
-    const uint64_t clip_groups = is_cpu ? 64 : 256, tile_groups = is_cpu ? 256 : 4096;
-    const bool is_counting = options.output == OutputCounts;
-    const int output = is_counting ? 3 : is_wide ? 0 : 1;
-    Status status = play(source.kernel, output, true, source.group, source.groups);
-    if (status) status = play("clip", output, true, few, clip_groups);
-    if (status && !is_wide) status = play("sums", output, true, is_cpu ? 8 : 256, 1);
-    if (status) status = play("tiles", output, false, few, tile_groups);
-    if (is_wide || is_counting) return status;
-    if (status) status = play(source.kernel, 2, false, source.group, source.groups);
-    if (status) status = play("tiles", 2, false, few, tile_groups);
-    return status;
+        compute.dispatch(std::min(pass.groups, row) * pass.group, divideUp(pass.groups, row), 1, where);
+    }
+    return {};
 }
 
 Status Rasterizer::create(const Device& device, const Options& options, Where where) {

@@ -136,6 +136,7 @@ void clipTriangle(uint id) {
     uint place, first_tile;
     const uint tiles = tilesOf(first, last);
     if (!takePlaces(POLYGON_PLACES, tiles, place, first_tile)) return;
+    state.polygons = 1u;
     Large large;
     large.a = corners[0].at;
     large.b = corners[widest].at;

@@ -2,7 +2,8 @@
 // docs/rasterization.md explains the numbers.
 //
 // GLINT_OUTPUT 0: depth and triangle by one 64-bit atomic. 1, 2: by 32-bit ones, first the depth, then the triangle of
-// that depth. 3: counts of triangles. GLINT_WIDE 1: there are 64-bit atomics.
+// that depth. 3: counts of triangles. GLINT_WIDE 1: there are 64-bit atomics. GLINT_PEEK 1: looks before it writes, which
+// pays where atomics are dearer than loads.
 #pragma once
 
 layout(std140, set = 0, binding = 0) uniform Frame {
@@ -51,7 +52,7 @@ layout(std430, binding = 1) buffer State {
     uint cut;       // ~ of the first place that is not to be used
     uint clips;     // triangles that have to be clipped
     uint missing;   // places that there was no room for
-    uint reserved;
+    uint polygons;  // 1: there are some
     // Since the last check.
     uint most_places, most_clips;
     uint is_crowded;  // 1: the tiles of a draw were 2^32 or more
@@ -78,8 +79,11 @@ void writePixel(ivec2 at, float depth, uint id, bool is_front) {
     const uint bits = floatBitsToUint(depth);
 #if GLINT_OUTPUT == 0
     const uint64_t value = packUint2x32(uvec2(~id, bits));
+#if GLINT_PEEK
     // What is read may be out of date, but never more than what is there.
-    if (pixels[pixel] < value) atomicMax(pixels[pixel], value);
+    if (pixels[pixel] >= value) return;
+#endif
+    atomicMax(pixels[pixel], value);
 #elif GLINT_OUTPUT == 1
     // The triangle of a lesser depth is forgotten; all of this happens before the second pass.
     if (words[2u * pixel + 1u] < bits && atomicMax(words[2u * pixel + 1u], bits) < bits) words[2u * pixel] = 0u;

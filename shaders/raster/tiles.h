@@ -1,4 +1,5 @@
 // What has been listed, tile by tile: each group has a row of tiles, and each of its threads pixels of every tile.
+// GLINT_POLYGONS 0: triangles. 1: polygons, by a kernel of their own, which most draws do not need.
 #pragma once
 
 #include <glint/raster/triangle.h>
@@ -24,6 +25,7 @@ Plane planeOf(Large large) {
     return plane;
 }
 
+#if GLINT_POLYGONS == 0
 void drawTile(Large large, ivec2 first, ivec2 last) {
     ivec2 a = large.a, b = large.b, c = large.c;
     const Wide area = wideCross(b - a, c - a);
@@ -45,17 +47,13 @@ void drawTile(Large large, ivec2 first, ivec2 last) {
     const ivec2 reach = last - first;
     const ivec3 largest = corner + reach.x * max(along_x, ivec3(0)) + reach.y * max(along_y, ivec3(0));
     if ((largest.x | largest.y | largest.z) < 0) return;
-    ivec3 row = corner + (begin.x - first.x) * along_x + (begin.y - first.y) * along_y;
-    for (int y = begin.y; y <= last.y; y += step.y) {
-        ivec3 edges = row;
-        for (int x = begin.x; x <= last.x; x += step.x) {
-            if ((edges.x | edges.y | edges.z) >= 0)
-                writePixel(ivec2(x, y), depthAt(plane, ivec2(x, y)), large.id, is_front);
-            edges += step.x * along_x;
-        }
-        row += step.y * along_y;
-    }
+    const ivec3 row = corner + (begin.x - first.x) * along_x + (begin.y - first.y) * along_y;
+    for (int y = 0; begin.y + y * step.y <= last.y; y += BLOCK.y)
+        drawBlock(begin + ivec2(0, y * step.y), step, last, row + y * step.y * along_y, step.x * along_x,
+                  step.y * along_y, plane, large.id, is_front);
 }
+
+#else
 
 ivec2 polygonCorner(uint place, uint corner) {
     const Large part = larges[place + 1u + corner / 3u];
@@ -94,6 +92,8 @@ void drawPolygonTile(Large large, uint place, ivec2 first, ivec2 last) {
     }
 }
 
+#endif
+
 // The last place whose first tile is not beyond this one. Places without tiles are never it.
 uint placeOf(uint tile, uint count) {
     uint begin = 0u, end = count;
@@ -112,10 +112,14 @@ void main() {
     const uint places = state.places;
 #endif
     const uint count = min(places, ~state.cut);
+#if GLINT_POLYGONS
+    if (state.polygons == 0u) return;
+#else
     if (groupIndex() == 0u && gl_LocalInvocationIndex == 0u) {
         state.most_places = max(state.most_places, count + state.missing);
         state.most_clips = max(state.most_clips, state.clips);
     }
+#endif
     if (count == 0u) return;
     const Large final = larges[count - 1u];
     const uint tiles = final.first_tile + tilesOf(unpackPixel(final.first), unpackPixel(final.last));
@@ -128,12 +132,19 @@ void main() {
     while (tile < end) {
         while (place + 1u < count && larges[place + 1u].first_tile <= tile) place++;
         const Large large = larges[place];
+        if ((large.polygon != 0u) != (GLINT_POLYGONS == 1)) {
+            tile = large.first_tile + tilesOf(unpackPixel(large.first), unpackPixel(large.last));
+            continue;
+        }
         const ivec2 box_first = unpackPixel(large.first), box_last = unpackPixel(large.last);
         const int columns = (box_last.x - box_first.x + TILE) / TILE, number = int(tile - large.first_tile);
         const ivec2 first = box_first + TILE * ivec2(number % columns, number / columns);
         const ivec2 last = min(first + TILE - 1, box_last);
-        if (large.polygon == 0u) drawTile(large, first, last);
-        else drawPolygonTile(large, place, first, last);
+#if GLINT_POLYGONS
+        drawPolygonTile(large, place, first, last);
+#else
+        drawTile(large, first, last);
+#endif
         tile++;
     }
 }

@@ -44,6 +44,35 @@ int edgeBias(ivec2 d) { return d.y < 0 || (d.y == 0 && d.x > 0) ? 0 : -1; }
 
 bool isKept(bool is_front) { return (frame.cull & (is_front ? 1u : 2u)) != 0u; }
 
+// Pixels of one thread: what is covered is found first, without branches, and written then. A turn that writes costs far
+// more than one that tests.
+const ivec2 BLOCK = ivec2(4, 8);
+
+// Pixels `stride` apart from `first` on, not beyond `last`; `row`, `along_x`, `along_y`: the edges' values at the first
+// pixel, and how they grow from pixel to pixel of the block.
+void drawBlock(ivec2 first, ivec2 stride, ivec2 last, ivec3 row, ivec3 along_x, ivec3 along_y, Plane plane, uint id,
+               bool is_front) {
+    uint columns = 0u;
+    [[unroll]] for (int x = 0; x < BLOCK.x; x++) columns |= uint(first.x + x * stride.x <= last.x) << x;
+    uint covered = 0u;
+    for (int y = 0; y < BLOCK.y && first.y + y * stride.y <= last.y; y++) {
+        ivec3 edges = row;
+        uint bits = 0u;
+        [[unroll]] for (int x = 0; x < BLOCK.x; x++) {
+            bits |= (uint(~(edges.x | edges.y | edges.z)) >> 31) << x;
+            edges += along_x;
+        }
+        covered |= (bits & columns) << (BLOCK.x * y);
+        row += along_y;
+    }
+    while (covered != 0u) {
+        const uint bit = uint(findLSB(covered));
+        covered &= covered - 1u;
+        const ivec2 pixel = first + stride * ivec2(bit % uint(BLOCK.x), bit / uint(BLOCK.x));
+        writePixel(pixel, depthAt(plane, pixel), id, is_front);
+    }
+}
+
 // Of at most 64 pixels each way: 32 bits suffice.
 void drawSmall(Corner a, Corner b, Corner c, ivec2 first, ivec2 last, uint id) {
     const ivec2 centre = first * UNIT + UNIT / 2;
@@ -59,21 +88,17 @@ void drawSmall(Corner a, Corner b, Corner c, ivec2 first, ivec2 last, uint id) {
         r = swapped;
     }
     const ivec2 pq = q - p, qr = r - q, rp = p - r;
-    ivec3 row = ivec3(pq.y * p.x - pq.x * p.y + edgeBias(pq), qr.y * q.x - qr.x * q.y + edgeBias(qr),
-                      rp.y * r.x - rp.x * r.y + edgeBias(rp));
-    const ivec3 step_x = -UNIT * ivec3(pq.y, qr.y, rp.y);
-    const int width = last.x - first.x + 1;
-    const ivec3 step_y = UNIT * ivec3(pq.x, qr.x, rp.x) - width * step_x;
-    ivec2 pixel = first;
+    const ivec3 corner = ivec3(pq.y * p.x - pq.x * p.y + edgeBias(pq), qr.y * q.x - qr.x * q.y + edgeBias(qr),
+                               rp.y * r.x - rp.x * r.y + edgeBias(rp));
+    const ivec3 along_x = -UNIT * ivec3(pq.y, qr.y, rp.y), along_y = UNIT * ivec3(pq.x, qr.x, rp.x);
     // One loop, since threads that run together take as many turns as the longest of them.
-    while (pixel.y <= last.y) {
-        if ((row.x | row.y | row.z) >= 0) writePixel(pixel, depthAt(plane, pixel), id, is_front);
-        row += step_x;
-        pixel.x++;
-        if (pixel.x > last.x) {
-            pixel = ivec2(first.x, pixel.y + 1);
-            row += step_y;
-        }
+    ivec2 at = first;
+    while (at.y <= last.y) {
+        const ivec2 offset = at - first;
+        drawBlock(at, ivec2(1), last, corner + offset.x * along_x + offset.y * along_y, along_x, along_y, plane, id,
+                  is_front);
+        at.x += BLOCK.x;
+        if (at.x > last.x) at = ivec2(first.x, at.y + BLOCK.y);
     }
 }
 

@@ -185,7 +185,7 @@ TEST_F(RasterizerTest, GivesTheSameAHundredTimes) {
     for (size_t i = 0; i < lowest.size(); i++) ASSERT_EQ(triangleOf(expected[i]), lowest[i]) << i;
 }
 
-// |depth - exact| <= 2^-24 (4 |depth_a| + 14 S) with S = |slope_x offset_x| + |slope_y offset_y|, in which each product
+// |depth - exact| <= 2^-24 (depth_a + 14 S) with S = |slope_x offset_x| + |slope_y offset_y|, in which each product
 // of the slope counts by its magnitude: docs/rasterization.md.
 TEST_F(RasterizerTest, DepthIsWithinItsBound) {
     const Vector2u size(64, 64);
@@ -210,7 +210,7 @@ TEST_F(RasterizerTest, DepthIsWithinItsBound) {
             const double sum = ((rise_b * std::abs(ac_y) + rise_c * std::abs(ab_y)) * offset_x +
                                 (rise_c * std::abs(ab_x) + rise_b * std::abs(ac_x)) * offset_y) /
                                area;
-            const double bound = 0x1p-24 * (4 * a.depth + 14 * sum);
+            const double bound = 0x1p-24 * (a.depth + 14 * sum);
             const double error = std::abs(depthOf(pixels[size_t{y} * size.x + x]) - exact);
             worst = std::max(worst, error / bound);
             largest = std::max(largest, error);

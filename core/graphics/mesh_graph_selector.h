@@ -55,9 +55,10 @@ public:
     /// Records the selection; getList() and getCount() are this one's from then on.
     ///
     /// `instances`: Transform3x4 each, object to world, from the beginning of a buffer with FlagStorage. One that is
-    /// not finite, or 0, draws nothing; one that has no inverse, or stretches 2^16 times as much one way as another, is
-    /// drawn in full. `size` of the picture in pixels. `pixels`: the error that may be seen, as MeshGraphView::error
-    /// has it; 0 is the full mesh (or what equals it, point by point).
+    /// not finite, all 0, or has its largest number (but for the translation) beyond 2^-60 and 2^60 draws nothing; one
+    /// that has no inverse, or stretches 2^16 times as much one way as another, is drawn in full. `size` of the picture
+    /// in pixels. `pixels`: the error that may be seen, as MeshGraphView::error has it; 0 is the full mesh (or what
+    /// equals it, point by point).
     ///
     /// Errors, which fail the list: "selector.view" (a camera that is not finite, a size of 0, an error that is
     /// negative or NaN), "selector.instances" (a buffer that is too small), "selector.too_many" (more than 2^32 - 1

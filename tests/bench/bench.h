@@ -84,6 +84,7 @@ Benchmark parallelGpuBenchmark();
 Benchmark splatLoadBenchmark();
 Benchmark splatFilesBenchmark();
 Benchmark lodBenchmark();
+Benchmark lodPixelsBenchmark();
 Benchmark splatAccuracyBenchmark();
 Benchmark splatTradeoffsBenchmark();
 Benchmark splatNeedlesBenchmark();

@@ -50,15 +50,39 @@ int main(int argc, char** argv) {
     int failed = 0;
     int found = 0;
     // The compiler's first shader is timed before any other benchmark compiles one.
-    const Benchmark benchmarks[] = {
-        shaderCompileBenchmark(),    dispatchBenchmark(),        drawBenchmark(),         warmFrameBenchmark(),
-        tracingFrameBenchmark(),     startupBenchmark(),         memoryBenchmark(),       tracingSoftwareBenchmark(),
-        tracingBuildBenchmark(),     tracingDeviceBenchmark(),   tracingLeaksBenchmark(), tracingDriverBenchmark(),
-        tracingTradeoffsBenchmark(), tracingGpuBenchmark(),      castBenchmark(),         castMemoryBenchmark(),
-        traversalHelloBenchmark(),   traversalOffsetBenchmark(), parallelBenchmark(),     parallelGpuBenchmark(),
-        splatAccuracyBenchmark(),    splatLoadBenchmark(),       splatFilesBenchmark(),   splatTradeoffsBenchmark(),
-        splatNeedlesBenchmark(),     splatSpeedBenchmark(),      splatGpuBenchmark(),     lodBenchmark(),
-        rasterBenchmark(),           rasterSceneBenchmark(),     mipmapBenchmark(),       tableBenchmark()};
+    const Benchmark benchmarks[] = {shaderCompileBenchmark(),
+                                    dispatchBenchmark(),
+                                    drawBenchmark(),
+                                    warmFrameBenchmark(),
+                                    tracingFrameBenchmark(),
+                                    startupBenchmark(),
+                                    memoryBenchmark(),
+                                    tracingSoftwareBenchmark(),
+                                    tracingBuildBenchmark(),
+                                    tracingDeviceBenchmark(),
+                                    tracingLeaksBenchmark(),
+                                    tracingDriverBenchmark(),
+                                    tracingTradeoffsBenchmark(),
+                                    tracingGpuBenchmark(),
+                                    castBenchmark(),
+                                    castMemoryBenchmark(),
+                                    traversalHelloBenchmark(),
+                                    traversalOffsetBenchmark(),
+                                    parallelBenchmark(),
+                                    parallelGpuBenchmark(),
+                                    splatAccuracyBenchmark(),
+                                    splatLoadBenchmark(),
+                                    splatFilesBenchmark(),
+                                    splatTradeoffsBenchmark(),
+                                    splatNeedlesBenchmark(),
+                                    splatSpeedBenchmark(),
+                                    splatGpuBenchmark(),
+                                    lodBenchmark(),
+                                    lodPixelsBenchmark(),
+                                    rasterBenchmark(),
+                                    rasterSceneBenchmark(),
+                                    mipmapBenchmark(),
+                                    tableBenchmark()};
     for (const Benchmark& benchmark : benchmarks) {
         if (!matches(benchmark, options.filter)) continue;
         found++;

@@ -70,6 +70,13 @@ ExactPicture::ExactPicture(const Mesh& mesh, const Matrix4x4d& to_clip, const Ve
     }
 }
 
+void ExactPicture::show(std::span<const uint32_t> triangles) {
+    for (uint32_t i = 0; i < pixels_.size(); i++) {
+        pixels_[i] = {infinity, triangles[i]};
+        if (triangles[i] != none) pixels_[i].depth = project(point(i % size_.x, i / size_.x)).z;
+    }
+}
+
 std::array<Vector3d, 3> ExactPicture::corners(uint32_t triangle) const {
     const uint32_t* indices = &mesh_.indices[triangle * size_t{3}];
     return {Vector3d(mesh_.positions[indices[0]]), Vector3d(mesh_.positions[indices[1]]),
@@ -125,7 +132,10 @@ Vector3d ExactPicture::point(uint32_t x, uint32_t y) const {
     const auto points = corners(triangle(x, y));
     std::array<Vector3d, 3> flat;
     for (size_t k = 0; k < 3; k++) flat[k] = beforeDivision(to_clip_ * Vector4d(points[k], 1.0), size_);
-    const auto share = shares(flat, {x + 0.5, y + 0.5});
+    auto share = shares(flat, {x + 0.5, y + 0.5});
+    // Of one sign; what is beyond an edge comes to the edge.
+    const double sign = share[0] + share[1] + share[2] < 0.0 ? -1.0 : 1.0;
+    for (double& s : share) s = std::max(s * sign, 0.0);
     return (points[0] * share[0] + points[1] * share[1] + points[2] * share[2]) / (share[0] + share[1] + share[2]);
 }
 

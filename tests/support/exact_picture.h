@@ -24,13 +24,17 @@ public:
 
     ExactPicture(const Mesh& mesh, const Matrix4x4d& to_clip, const Vector2u& size);
 
+    /// Takes over which triangle each pixel shows, row after row, from someone else's picture; `none` for nothing.
+    void show(std::span<const uint32_t> triangles);
+
     const Vector2u& size() const { return size_; }
     /// The nearest triangle at a pixel's centre, edges included, the lowest of equally near ones; `none` if nothing is
     /// there.
     uint32_t triangle(uint32_t x, uint32_t y) const { return pixels_[y * size_t{size_.x} + x].triangle; }
     /// Of it: w, which is the distance along the camera's axis; infinite where nothing is.
     double depth(uint32_t x, uint32_t y) const { return pixels_[y * size_t{size_.x} + x].depth; }
-    /// The point of the mesh that is seen there: exactly in its triangle, rounding aside.
+    /// The point of the mesh that is seen there: exactly in its triangle, rounding aside, also if the triangle that
+    /// show() was told of only comes near.
     Vector3d point(uint32_t x, uint32_t y) const;
 
     /// Where a point of the mesh is in the picture, in pixels from its top left corner; w in the third place.

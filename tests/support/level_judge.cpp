@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 namespace glint::test {
 
@@ -19,6 +20,7 @@ constexpr double infinity = std::numeric_limits<double>::infinity();
 struct Cut {
     Mesh mesh;
     std::vector<double> errors;
+    std::map<uint32_t, uint32_t> first;  ///< triangle of each cluster
 };
 
 Cut collect(const MeshGraph& graph, std::span<const uint32_t> clusters) {
@@ -26,6 +28,7 @@ Cut collect(const MeshGraph& graph, std::span<const uint32_t> clusters) {
     cut.mesh.positions.assign(graph.positions().begin(), graph.positions().end());
     for (const uint32_t i : clusters) {
         const MeshCluster& c = graph.clusters()[i];
+        cut.first[i] = static_cast<uint32_t>(cut.errors.size());
         for (const uint32_t packed : graph.clusterTriangles().subspan(c.first_triangle, c.triangleCount())) {
             for (const uint32_t shift : {0u, 10u, 20u})
                 cut.mesh.indices.push_back(graph.clusterVertices()[c.first_vertex + (packed >> shift & 0x3ffu)]);
@@ -154,6 +157,8 @@ struct LevelJudge::Side {
     const ExactPicture& picture;
     const Tree& tree;
     double pixels;      ///< that are allowed
+    double moved;       ///< pixels by which the picture may be off at the depth 1, and ...
+    double rounded;     ///< ... at any
     double more;        ///< distance by which rounding may move partners apart
     double depth_unit;  ///< the largest e that may be seen, over its depth
     double near;        ///< depth of the near plane
@@ -171,7 +176,8 @@ void LevelJudge::look(const Side& from, const Side& to, uint32_t stride, LevelCo
             if (triangle == ExactPicture::none) continue;
             const Vector2d place(x + 0.5, y + 0.5);
             const Vector2d border = glm::min(place, Vector2d(size) - place);
-            if (std::min(border.x, border.y) <= from.pixels) continue;
+            const double allowed = from.pixels + from.rounded + from.moved / from.picture.depth(x, y);
+            if (std::min(border.x, border.y) <= allowed) continue;
             const bool is_different = to.picture.triangle(x, y) == ExactPicture::none;
             if (is_different) result.different++;
             if (!is_different && (y * size.x + x) % stride != 0) continue;
@@ -191,7 +197,7 @@ void LevelJudge::look(const Side& from, const Side& to, uint32_t stride, LevelCo
                                displacement = std::min(displacement, glm::distance(Vector2d(seen), place));
                                distance = std::min(distance, error > 0.0 ? apart / error : 0.0);
                            });
-            if (!(displacement <= from.pixels)) {
+            if (!(displacement <= allowed)) {
                 if (is_at_near) {
                     result.at_near++;
                 } else {
@@ -206,8 +212,8 @@ void LevelJudge::look(const Side& from, const Side& to, uint32_t stride, LevelCo
             result.distance = std::max(result.distance, distance);
             if (is_different) {
                 // It may be further than the partner only if that is wrong.
-                result.silhouette =
-                    std::max(result.silhouette, to.picture.distanceToCoverage(place, from.pixels * 1.5 + 1.0));
+                result.silhouette = std::max(result.silhouette,
+                                             to.picture.distanceToCoverage(place, std::min(allowed * 1.5 + 1.0, 16.0)));
             } else {
                 const double depth = from.picture.depth(x, y);
                 result.depths.push_back(std::abs(to.picture.depth(x, y) - depth) / (depth * from.depth_unit));
@@ -216,12 +222,13 @@ void LevelJudge::look(const Side& from, const Side& to, uint32_t stride, LevelCo
 }
 
 LevelComparison LevelJudge::compare(std::span<const uint32_t> clusters, const CameraParameters& camera,
-                                    const Transform3x4& instance, const Vector2u& size, double pixels,
-                                    uint32_t stride) const {
+                                    const Transform3x4& instance, const Vector2u& size, double pixels, uint32_t stride,
+                                    std::span<const SeenTriangle> seen) const {
     const Cut cut = collect(graph_, clusters);
     const Tree cut_tree(cut.mesh, cut.errors);
     const Matrix4x4d to_clip = toClip(camera, instance);
-    const ExactPicture full(mesh_, to_clip, size), shown(cut.mesh, to_clip, size);
+    const ExactPicture full(mesh_, to_clip, size);
+    ExactPicture shown(cut.mesh, to_clip, size);
 
     // MeshGraphView::error, and the eye of which it knows, are float32: docs/meshes.md. Points and partners are found
     // by some dozens of operations in float64 on the mesh's coordinates; where the eye is far away, a pixel's ray is
@@ -235,10 +242,34 @@ LevelComparison LevelJudge::compare(std::span<const uint32_t> clusters, const Ca
     const double allowed = pixels * (1.0 + 0x1p-19 * (1.0 + double{view.stretch} / view.slant)) + 0x1p-30;
     LevelComparison result;
     result.triangles = cut.mesh.triangleCount();
-    const auto side = [&](const ExactPicture& picture, const Tree& tree) {
-        return Side{picture, tree, allowed, reach * 0x1p-44, std::max(pixels, 1e-6) / scale, view.near};
+    if (!seen.empty()) {
+        std::vector<uint32_t> triangles(seen.size(), ExactPicture::none);
+        for (size_t i = 0; i < seen.size(); i++) {
+            if (seen[i].cluster == UINT32_MAX) continue;
+            const auto place = cut.first.find(seen[i].cluster);
+            if (place == cut.first.end() || seen[i].triangle >= graph_.clusters()[seen[i].cluster].triangleCount()) {
+                result.unexplained++;
+                result.first =
+                    fmt::format("cluster {}, triangle {} is not in the cut", seen[i].cluster, seen[i].triangle);
+                continue;
+            }
+            triangles[i] = place->second + seen[i].triangle;
+        }
+        shown.show(triangles);
+    }
+    // Half a step of 2^-8 along x and y; and what float32 makes of a place on its way to the picture: three products
+    // and sums of up to `reach`, twice, 2^-24 each.
+    const auto side = [&](const ExactPicture& picture, const Tree& tree, bool is_rounded) {
+        return Side{picture,
+                    tree,
+                    allowed,
+                    is_rounded ? 0x1p-20 * reach * double{view.scale} : 0.0,
+                    is_rounded ? 0x1p-8 : 0.0,
+                    reach * 0x1p-44,
+                    std::max(pixels, 1e-6) / scale,
+                    view.near};
     };
-    const Side full_side = side(full, *tree_), shown_side = side(shown, cut_tree);
+    const Side full_side = side(full, *tree_, false), shown_side = side(shown, cut_tree, !seen.empty());
     look(full_side, shown_side, stride, result);
     look(shown_side, full_side, stride, result);
     return result;

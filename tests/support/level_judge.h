@@ -42,6 +42,12 @@ struct LevelComparison {
     double depth(double share);
 };
 
+/// What a pixel of a device's picture shows.
+struct SeenTriangle {
+    uint32_t cluster = UINT32_MAX;  ///< UINT32_MAX: nothing
+    uint32_t triangle = 0;          ///< of the cluster
+};
+
 /// A mesh and its graph, to be compared from many views.
 class LevelJudge {
 public:
@@ -49,9 +55,12 @@ public:
     LevelJudge(const Mesh& mesh, const MeshGraph& graph);
     ~LevelJudge();
 
-    /// Compares a cut with the mesh. Of the pixels that both cover every `stride`-th is judged.
+    /// Compares a cut with the mesh. Of the pixels that both cover every `stride`-th is judged. `seen`: a picture of
+    /// the cut, row after row, that a device has made of it, with corners rounded to 2^-8 pixel; without it the exact
+    /// one. A pixel of a cluster that is not in the cut is unexplained.
     LevelComparison compare(std::span<const uint32_t> cut, const CameraParameters& camera, const Transform3x4& instance,
-                            const Vector2u& size, double pixels, uint32_t stride = 1) const;
+                            const Vector2u& size, double pixels, uint32_t stride = 1,
+                            std::span<const SeenTriangle> seen = {}) const;
 
 private:
     class Tree;

@@ -80,8 +80,8 @@ void writePixel(ivec2 at, float depth, uint id, bool is_front) {
 #if GLINT_OUTPUT == 0
     const uint64_t value = packUint2x32(uvec2(~id, bits));
 #if GLINT_PEEK
-    // What is read may be out of date, but never more than what is there.
-    if (pixels[pixel] >= value) return;
+    // The depth only grows: what is read may be out of date, or its halves of different times, but is never more.
+    if (unpackUint2x32(pixels[pixel]).y > bits) return;
 #endif
     atomicMax(pixels[pixel], value);
 #elif GLINT_OUTPUT == 1

@@ -131,6 +131,7 @@ int main(int argc, char** argv) {
     id_kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader", "ID_SHADER=1");
     Texture depth, id_picture;
 
+    bool is_listed = false;  // the last frame, by the selector
     Statistics& statistics = example.statistics();
     Viewer viewer(example, device);
     const Status status = viewer.run([&](Frame& frame) -> Status {
@@ -169,7 +170,8 @@ int main(int argc, char** argv) {
 
         ids.begin(device, frame.width, frame.height);
         Compute compute = device.createCompute();
-        if (use_compute || !missing.empty()) {
+        is_listed = use_compute || !missing.empty();
+        if (is_listed) {
             if (Status created = createCompute(); !created) return created;
             // The first may find that the list is too short: it grows with the second.
             Status selected;
@@ -235,7 +237,7 @@ int main(int argc, char** argv) {
     if (Status saved = ids.save(device); !saved) return report(saved.error());
 
     Counts drawn = {};
-    if (selector) {
+    if (is_listed) {
         const MeshGraphSelector::Statistics selected = selector.getStatistics();
         drawn.clusters = selected.clusters;
         drawn.triangles = static_cast<uint32_t>(selected.triangles);
@@ -257,7 +259,7 @@ int main(int argc, char** argv) {
                          {"graph_clusters", model.clusterCount()},
                          {"graph_groups", model.groupCount()},
                          {"graph_bytes", model.bytes()},
-                         {"list_bytes", selector ? selector.getStatistics().bytes + arguments.getSize() : 0}};
+                         {"list_bytes", is_listed ? selector.getStatistics().bytes + arguments.getSize() : 0}};
     std::printf("%u instances of %llu triangles, in %u clusters of %.1f MB\n", instances,
                 static_cast<unsigned long long>(model.triangleCount()), model.clusterCount(),
                 static_cast<double>(model.bytes()) * 1e-6);

@@ -85,6 +85,7 @@ Benchmark splatLoadBenchmark();
 Benchmark splatFilesBenchmark();
 Benchmark lodBenchmark();
 Benchmark lodPixelsBenchmark();
+Benchmark lodViewsBenchmark();
 Benchmark splatAccuracyBenchmark();
 Benchmark splatTradeoffsBenchmark();
 Benchmark splatNeedlesBenchmark();

@@ -79,6 +79,7 @@ int main(int argc, char** argv) {
                                     splatGpuBenchmark(),
                                     lodBenchmark(),
                                     lodPixelsBenchmark(),
+                                    lodViewsBenchmark(),
                                     rasterBenchmark(),
                                     rasterSceneBenchmark(),
                                     mipmapBenchmark(),

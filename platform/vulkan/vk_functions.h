@@ -51,7 +51,7 @@ namespace glint::vulkan {
     X(CmdDrawIndexed) X(CmdDrawIndirect) X(CmdDrawIndexedIndirect) \
     X(CmdDrawIndirectCount) X(CmdDrawIndexedIndirectCount) X(CmdCopyBuffer) X(CmdFillBuffer) \
     X(CmdCopyBufferToImage) X(CmdCopyImageToBuffer) X(CmdCopyImage) X(CmdClearColorImage) \
-    X(CmdClearDepthStencilImage) X(CmdBlitImage) X(CmdResetQueryPool) X(CmdBeginQuery) \
+    X(CmdClearDepthStencilImage) X(CmdResetQueryPool) X(CmdBeginQuery) \
     X(CmdEndQuery) X(CmdWriteTimestamp2)
 
 #define GLINT_VULKAN_SWAPCHAIN_FUNCTIONS(X) \

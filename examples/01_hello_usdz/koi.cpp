@@ -138,7 +138,7 @@ ScenePrimitive makeBody(uint32_t material) {
             follow(body, s);
             // The lips go forward and apart, and the cheeks out.
             const float lips = 1 - ease(0.0f, 0.03f, s), cheeks = ease(0.05f, 0.12f, s) * (1 - ease(0.14f, 0.2f, s));
-            mouth.positions.emplace_back(0.05f * lips * std::fabs(std::cos(angle)), 0.03f * lips * std::cos(angle),
+            mouth.positions.emplace_back(0.02f * lips * std::fabs(std::cos(angle)), 0.03f * lips * std::cos(angle),
                                          0.035f * cheeks * std::sin(angle));
         }
     addGrid(body, along, around);
@@ -374,7 +374,7 @@ void addKey(SceneChannel& channel, float time, const Vector4f& value) {
 
 /// A fish, which swims on a circle: its nodes, its skin and its channels.
 void addFish(Scene& scene, uint32_t number) {
-    const float phase = 2 * pi * static_cast<float>(number) / fish + 0.4f * static_cast<float>(number);
+    const float phase = 2 * pi * static_cast<float>(number) / fish;
     const auto first = static_cast<uint32_t>(scene.nodes.size());
     const uint32_t circle = first, place = first + 1, shape = first + 2, joints = first + 3;
     scene.nodes.resize(first + 3 + joint_count);
@@ -385,7 +385,7 @@ void addFish(Scene& scene, uint32_t number) {
     scene.nodes[place].name = "place";
     // The nose is where the circle goes to.
     scene.nodes[place].transform = {
-        {0.0f, -0.35f * static_cast<float>(number), 1.35f - 0.12f * static_cast<float>(number)},
+        {0.0f, -0.25f * static_cast<float>(number), 1.6f - 0.1f * static_cast<float>(number)},
         {0, 0, 0, 1},
         Vector3f(1.0f)};
     scene.nodes[place].children = {joints + root_joint};

@@ -200,10 +200,11 @@ int main(int argc, char** argv) {
             return posed;
 
         // Koi are seen from above, a model of a file from before it.
-        const Vector3f way = path.empty() ? Vector3f(0.12f, -0.62f, 0.95f) : Vector3f(0.7f, -1.7f, 0.6f);
-        const Vector3f from = frame.view.eye(way * radius, {0, 0, 0});
+        const Vector3f way = path.empty() ? Vector3f(0.05f, -0.6f, 1.05f) : Vector3f(0.7f, -1.7f, 0.6f);
+        const Vector3f to = path.empty() ? Vector3f(0.0f, -0.1f, 0.0f) * radius : Vector3f(0.0f);
+        const Vector3f from = frame.view.eye(way * radius, to);
         const Camera camera = Camera()
-                                  .lookAt(centre + toScene(from), centre, {0, 1, 0})
+                                  .lookAt(centre + toScene(from), centre + toScene(to), {0, 1, 0})
                                   .perspective(60.0f, frame.aspect(), radius * 1e-2f);
         Command command = device.createCommand(target);
         frame.timer.begin(command, "draw");

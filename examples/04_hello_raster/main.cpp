@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
     Rasterizer rasterizer;
     if (Status status = rasterizer.create(device); !status) return report(status.error());
     Kernel shade = device.createKernel("shade");
-    shade.loadShaderGLSL(EXAMPLE_DIR "/main.shader", std::string("SHADE=1") + ids.macro());
+    shade.loadShaderGLSL(EXAMPLE_DIR "/main.shader", ids.macro());
     if (!shade.create()) return report(shade.error());
 
     Viewer viewer(example, device);

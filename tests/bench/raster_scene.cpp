@@ -21,8 +21,8 @@ namespace glint::bench {
 
 namespace {
 
-constexpr uint32_t turns = 3;
-constexpr uint32_t frames = 6;
+constexpr uint32_t turns = 2;
+constexpr uint32_t frames = 7;
 
 struct Way {
     const char* name;
@@ -32,6 +32,12 @@ struct Way {
     uint64_t triangles = 0;
     std::string ids;
 
+    /// Of the fastest frame, which other programs have disturbed least.
+    double fastest() const {
+        double sum = 0.0;
+        for (const auto& [pass, each] : times) sum += each.minimum();
+        return sum;
+    }
     double median() const {
         double sum = 0.0;
         for (const auto& [pass, each] : times) sum += each.median();
@@ -67,12 +73,12 @@ void runExample(Way& way, const char* time, const test::TempDir& folder) {
 void printRow(const Way& way, const Way& traced) {
     std::string passes;
     for (const std::string& pass : way.passes)
-        passes += fmt::format("{}{} {:.1f}", passes.empty() ? "" : ", ", pass, way.times.at(pass).median());
+        passes += fmt::format("{}{} {:.1f}", passes.empty() ? "" : ", ", pass, way.times.at(pass).minimum());
     const test::InstancePicture ours = *check(test::InstancePicture::load(way.ids));
     const test::InstancePicture theirs = *check(test::InstancePicture::load(traced.ids));
     const test::InstanceDifferences found = test::compareInstances(theirs, ours);
-    fmt::print("  {:<40} {:>9.1f}  {:>10}  {:>7} {:>7} {:>7} {:>7}  {}\n", way.command, way.median(), way.triangles,
-               found.count(), found.near_both, found.near_one, found.elsewhere, passes);
+    fmt::print("  {:<26} {:>9.1f} {:>9.1f}  {:>10}  {:>7} {:>7} {:>7} {:>7}  {}\n", way.command, way.fastest(),
+               way.median(), way.triangles, found.count(), found.near_both, found.near_one, found.elsewhere, passes);
 }
 
 void run(Report& report) {
@@ -85,17 +91,17 @@ void run(Report& report) {
                       {"tracing", "05_hello_tracing"}};
         for (uint32_t turn = 0; turn < turns; turn++)
             for (Way& way : ways) runExample(way, time, folder);
-        fmt::print(
-            "1600 x 900 at {} s, milliseconds of a frame, medians of {} frames; pixels that show another instance "
-            "than 05: all, near an edge in both pictures, in one, in neither\n",
-            time, turns * (frames - 2));
+        fmt::print("1600 x 900 at {} s, milliseconds of a frame, fastest and median of {}; triangles; pixels that show "
+                   "another instance "
+                   "than 05: all, near an edge in both pictures, in one, in neither\n",
+                   time, turns * (frames - 2));
         for (const Way& way : ways) printRow(way, ways[3]);
         if (std::string_view(time) != "3.14159") continue;
-        const double driver = std::min(ways[1].median(), ways[2].median());
-        report.add("raster.scene.raster_ms", ways[0].median(), "ms", "nothing", device);
+        const double driver = std::min(ways[1].fastest(), ways[2].fastest());
+        report.add("raster.scene.raster_ms", ways[0].fastest(), "ms", "nothing", device);
         report.add("raster.scene.mesh_ms", driver, "ms", "nothing", device);
-        report.add("raster.scene.tracing_ms", ways[3].median(), "ms", "nothing", device);
-        report.add("raster.instances.compute_over_driver", driver / ways[0].median(), "ratio of speeds",
+        report.add("raster.scene.tracing_ms", ways[3].fastest(), "ms", "nothing", device);
+        report.add("raster.instances.compute_over_driver", driver / ways[0].fastest(), "ratio of speeds",
                    "the faster of the driver's pipelines", device);
     }
 }

@@ -214,7 +214,7 @@ TEST(Golden, BindlessMasks) {
         }
         return count;
     };
-    const auto [whole, hidden] = render({});
+    const auto [whole, hidden] = render(nlohmann::json::object());
     EXPECT_GT(whole, 300);
     const auto [half, seen] = render({{"alphaMode", "MASK"}});
     // What stays is the half next to the camera, which is seen twice as large; edges are a few pixels.

@@ -120,7 +120,8 @@ public:
     Vector2u getSize() const;
 
     /// Waits for the device. "raster.capacity" if a list of a draw since the last check was too short: triangles are
-    /// missing. The lists grow with the next begin(), as far as the device allows.
+    /// missing. The lists grow with the next begin(), as far as the device allows. "raster.tiles" if the tiles of
+    /// one draw's large triangles were 2^32 or more, which no list holds.
     Status check(Where where = Where::current());
     Statistics getStatistics() const;
 

@@ -6,6 +6,7 @@
 
 #include <memory>
 #include <optional>
+#include <utility>
 
 namespace glint::shader {
 
@@ -84,6 +85,11 @@ Status checkEntry(const ShaderSource& source, std::span<const uint32_t> words);
 
 /// `optimize` for words that have passed `findFault`.
 Expected<std::vector<uint32_t>> optimizeValid(const ShaderSource& source, std::span<const uint32_t> words);
+
+/// A valid module with these values (ids and bits) of its specialisation constants, which are constants as any others
+/// afterwards. Error: "shader.tracing_internal".
+Expected<std::vector<uint32_t>> fixConstants(std::span<const uint32_t> words,
+                                             std::span<const std::pair<uint32_t, uint32_t>> values);
 
 /// `reflect` for words that have passed `findFault`.
 Expected<Reflection> reflectValid(std::span<const uint32_t> words, ShaderStage stage, std::string_view entry);

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <unordered_map>
 
 namespace glint::shader {
 
@@ -178,6 +179,24 @@ Expected<std::vector<uint32_t>> optimize(const ShaderSource& source, std::span<c
     if (std::optional<std::string> fault = findFault(words))
         return unexpected(sourceError(source, ErrorCode::ShaderCompile, "shader.optimize", std::move(*fault)));
     return optimizeValid(source, words);
+}
+
+Expected<std::vector<uint32_t>> fixConstants(std::span<const uint32_t> words,
+                                             std::span<const std::pair<uint32_t, uint32_t>> values) {
+    std::unordered_map<uint32_t, std::vector<uint32_t>> bits;
+    for (const auto& [id, value] : values) bits[id] = {value};
+    Complaint complaint;
+    spvtools::Optimizer optimizer(environment);
+    optimizer.SetMessageConsumer(complaint.consumer());
+    optimizer.RegisterPass(spvtools::CreateSetSpecConstantDefaultValuePass(bits));
+    optimizer.RegisterPass(spvtools::CreateFreezeSpecConstantValuePass());
+    optimizer.RegisterPass(spvtools::CreateFoldSpecConstantOpAndCompositePass());
+    spvtools::OptimizerOptions options;
+    options.set_run_validator(false);
+    std::vector<uint32_t> result;
+    if (optimizer.Run(words.data(), words.size(), &result, options)) return result;
+    return unexpected(
+        makeError(ErrorCode::Internal, "shader.tracing_internal", "constants cannot be fixed: {}", complaint.text));
 }
 
 std::string disassemble(std::span<const uint32_t> words) {

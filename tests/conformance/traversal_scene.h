@@ -67,6 +67,7 @@ using Words = std::vector<uint32_t>;
 
 class TraversalTest : public ConformanceTest {
 protected:
+    using ConformanceTest::ConformanceTest;
     using Bounds = std::array<float, 6>;  ///< minimum, maximum
 
     void SetUp() override {

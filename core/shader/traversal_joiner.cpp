@@ -1,0 +1,54 @@
+#include "traversal_joiner.h"
+
+#include "shader_source.h"
+#include "traversal_linker.h"
+#include "traversal_skeleton.h"
+
+#include <glint/base/format_error.h>
+
+namespace glint::shader {
+
+namespace {
+
+constexpr uint32_t version_1_4 = 0x10400;
+
+Error internalError(const TraversalSource& source, std::string_view what) {
+    return makeError(ErrorCode::Internal, "shader.tracing_internal", "the joined pipeline '{}': {}", source.name, what);
+}
+
+Expected<SpirvModule> stageModule(const TraversalSource::Stage& stage) {
+    Expected<std::vector<uint32_t>> fixed = fixConstants(stage.words, stage.constants);
+    if (!fixed) return unexpected(fixed.error());
+    return SpirvModule::parse(*fixed);
+}
+
+}  // namespace
+
+Expected<std::vector<uint32_t>> joinTraversal(const TraversalSource& source) {
+    std::vector<SpirvModule> modules;
+    for (const TraversalSource::Stage& stage : source.stages) {
+        Expected<SpirvModule> module = stageModule(stage);
+        if (!module) return unexpected(internalError(source, module.error().message()));
+        modules.push_back(std::move(*module));
+    }
+    const auto makeSkeleton = [&](const SkeletonNeeds& needs) -> Expected<SpirvModule> {
+        const ShaderSource skeleton = skeletonSource(source, needs);
+        const Expected<Preprocessed> preprocessed = preprocess(skeleton);
+        if (!preprocessed) return unexpected(preprocessed.error());
+        Expected<std::vector<uint32_t>> words = compileLibrary(skeleton, *preprocessed, version_1_4);
+        if (!words) return unexpected(words.error());
+        return SpirvModule::parse(*words);
+    };
+    Expected<SpirvModule> linked = linkTraversal(source, std::move(modules), makeSkeleton);
+    if (!linked) {
+        if (linked.error().code() == ErrorCode::Internal || linked.error().code() == ErrorCode::ShaderCompile)
+            return unexpected(internalError(source, linked.error().text()));
+        return unexpected(linked.error());
+    }
+    std::vector<uint32_t> words = linked->words();
+    if (const std::optional<std::string> fault = findFault(words))
+        return unexpected(internalError(source, fmt::format("{}\n{}", *fault, disassemble(words))));
+    return words;
+}
+
+}  // namespace glint::shader

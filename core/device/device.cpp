@@ -135,6 +135,7 @@ Traversal Device::createTraversal(std::string_view name, Where where) {
     Traversal traversal = make<Traversal, detail::TraversalObject>(*this, name, where);
     if (traversal.state() != ObjectState::Building) return traversal;
     DeviceObject& object = *opened(*this);
+    if (object.joinsTraversals()) return traversal;
     if (object.features().rayTracing)
         object.buildForTraversals();
     else

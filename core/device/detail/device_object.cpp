@@ -14,6 +14,9 @@ namespace glint::detail {
 
 namespace {
 
+/// How deep rays of a joined traversal nest: its search is inlined at every call of every level.
+constexpr uint32_t joined_recursion = 4;
+
 /// What a program asks for, else what the environment does.
 Expected<TracingEngine> askedEngine(TracingEngine engine) {
     const char* name = std::getenv("GLINT_TRACING");
@@ -89,6 +92,11 @@ Status DeviceObject::open(const DeviceDesc& desc, Where where) {
     return {};
 }
 
+bool DeviceObject::joinsTraversals() const {
+    const char* const asked = std::getenv("GLINT_TRAVERSAL");
+    return heap_ && asked && std::strcmp(asked, "software") == 0;
+}
+
 void DeviceObject::chooseEngine(TracingEngine wanted, FeatureMask queries) {
     features_ = backend->features();
     info_ = backend->info();
@@ -112,6 +120,10 @@ void DeviceObject::chooseEngine(TracingEngine wanted, FeatureMask queries) {
         features_.maxTracingPrimitives = features_.maxTracingInstances = max_primitives;
         features_.scratchAlignment = std::max(features_.scratchAlignment, features_.storageAlignment);
         heap_ = std::make_shared<TracingHeap>(*this);
+    }
+    if (joinsTraversals()) {
+        features_.recursionDepth = std::min(features_.recursionDepth, joined_recursion);
+        features_.indirectRays = false;
     }
     info_.tracing = fmt::format("{}{} ({})", toString(engine),
                                 heap_ ? fmt::format(", nodes read as {}", toString(heap_->form())) : "", reason);

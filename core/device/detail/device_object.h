@@ -36,6 +36,8 @@ public:
     /// The heap of the software engine, null if the driver answers ray queries.
     TracingHeap* heap() const { return heap_.get(); }
     MipmapKernels& mipmaps() { return mipmaps_; }
+    /// Whether pipelines of rays are joined into kernels for the software engine: with $GLINT_TRAVERSAL "software".
+    bool joinsTraversals() const;
     /// From here on the driver builds structures beside the software engine.
     void buildForTraversals() { traversals_.store(true, std::memory_order_relaxed); }
     bool buildsForTraversals() const { return heap_ && traversals_.load(std::memory_order_relaxed); }

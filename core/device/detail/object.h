@@ -311,8 +311,14 @@ public:
     std::array<std::vector<TraversalDesc::Group>, ray_tables> groups;
     std::array<std::vector<Record>, ray_tables> records;
     uint32_t recursion_depth = 1;
+    /// In software: the stages joined into one kernel, which is what lists play, and its binding table.
+    Ref<KernelObject> joined;
+    Ref<BufferObject> joined_records;
 
 private:
+    Status check(const Stages& stages, Where where) const;
+    Status join(const Stages& stages, Where where);
+    std::vector<uint32_t> recordWords() const;
     Error checkRecords(const Stages& stages, Where where) const;
     bool isCalled(const Stages& stages, uint32_t shader) const;
     Error checkVariables(const Stages& stages, Where where) const;

@@ -18,7 +18,9 @@ constexpr uint64_t inline_limit = 1u << 20;
 void RecorderCore::setKernel(const Kernel& kernel, Where where) {
     if (!recording(where) || !onQueue(Queue::Compute, "setKernel", where)) return;
     if (kernel.state() == ObjectState::Building) static_cast<KernelObject*>(kernel.object())->waitCreated();
-    if (usable(kernel, "setKernel", where)) setProgram(*static_cast<KernelObject*>(kernel.object()));
+    if (!usable(kernel, "setKernel", where)) return;
+    setProgram(*static_cast<KernelObject*>(kernel.object()));
+    ray_records_ = none;
 }
 
 void RecorderCore::setTraversal(const Traversal& traversal, uint32_t generation, Where where) {
@@ -29,8 +31,24 @@ void RecorderCore::setTraversal(const Traversal& traversal, uint32_t generation,
     if (const uint32_t count = object->countRecords(RayTable::Generation); generation >= count)
         return fail(where, ErrorCode::OutOfRange, "traversal.generation",
                     "setTraversal: ray-generation shader {} of {}, which has {}", generation, object->label(), count);
-    setProgram(*object);
     ray_generation_ = generation;
+    ray_records_ = none;
+    if (!object->joined) return setProgram(*object);
+    setProgram(*object->joined);
+    ray_records_ = use(*object->joined_records);
+}
+
+/// Puts the blocks of a joined traversal's records and launch, its last ones, into their slots, or what was there
+/// before.
+void RecorderCore::swapLaunch(std::array<Bound, 2>& bound) {
+    constexpr SlotKind kinds[] = {SlotKind::Storage, SlotKind::Uniform};
+    for (size_t i = 0; i < bound.size(); i++) {
+        const auto kind = static_cast<size_t>(kinds[i]);
+        const size_t slots = program_->layout.slots[kind].size();
+        if (bound_[kind].size() < slots) bound_[kind].resize(slots);
+        std::swap(bound_[kind][slots - 1], bound[i]);
+    }
+    bindings_dirty_ = uniforms_dirty_ = true;
 }
 
 void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Where where) {
@@ -53,7 +71,22 @@ void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Whe
                         kernel.group_size[i], count, "xyz"[i], limits[i]);
         groups[i] = static_cast<uint32_t>(count);
     }
-    if (!flushBindings("dispatch", where) || !flushPush("dispatch", where)) return;
+    std::array<Bound, 2> launch;
+    const bool is_joined = ray_records_ != none;
+    if (is_joined) {
+        const uint32_t rays[4] = {static_cast<uint32_t>(width), static_cast<uint32_t>(height),
+                                  static_cast<uint32_t>(depth), ray_generation_};
+        launch[0].set = launch[1].set = true;
+        launch[0].value.resource = ray_records_;
+        launch[0].value.size = static_cast<const BufferObject*>(list_.resources[ray_records_])->size;
+        launch[1].inlined = true;
+        launch[1].value.offset = appendInline(rays, sizeof(rays), features.uniformAlignment, sizeof(rays));
+        launch[1].value.size = sizeof(rays);
+        swapLaunch(launch);
+    }
+    const bool flushed = flushBindings("dispatch", where) && flushPush("dispatch", where);
+    if (is_joined) swapLaunch(launch);
+    if (!flushed) return;
     beginAccesses();
     auto& command = push<DispatchCommand>(CommandType::Dispatch);
     shareAccesses(command.header);
@@ -95,7 +128,7 @@ void RecorderCore::dispatchIndirect(const Buffer& buffer, uint64_t offset, Where
         return fail(where, ErrorCode::InvalidArgument, "dispatch.kernel",
                     "dispatchIndirect: no kernel or traversal has been set");
     const bool is_traversal = program_->type() == ObjectType::Traversal;
-    if (is_traversal && !device_->features().indirectRays)
+    if ((is_traversal || ray_records_ != none) && !device_->features().indirectRays)
         return fail(where, ErrorCode::Unsupported, "dispatch.rays_indirect",
                     "dispatchIndirect: {} takes no counts of rays from a buffer", device_->info().name);
     BufferObject* object = usableBuffer(buffer, Buffer::FlagIndirect, "dispatchIndirect", where);

@@ -240,6 +240,7 @@ private:
     /// Of the accesses that were begun.
     void copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size);
     void makeMipmap(TextureObject& texture, const MipmapPlan& plan, size_t index, BufferObject& scratch, Where where);
+    void swapLaunch(std::array<Bound, 2>& bound);
     void traceRays(uint64_t width, uint64_t height, uint64_t depth, Where where);
     bool checkReferences(const TracingObject& tracing, Where where);
     void confirmBuild(TracingObject& tracing);
@@ -281,6 +282,7 @@ private:
     ProgramObject* program_ = nullptr;  ///< the list keeps it alive
     uint32_t program_resource_ = 0;
     uint32_t ray_generation_ = 0;
+    uint32_t ray_records_ = none;  ///< of a joined traversal, whose kernel is `program_`
     bool bindings_dirty_ = true;
     bool uniforms_dirty_ = true;
     bool push_dirty_ = true;

@@ -205,7 +205,8 @@ int main(int argc, char** argv) {
     }
     const Tracing top = device.createTracing(instances);
     structures.push_back(top);
-    if (Status status = device.buildTracings(structures, Buffer(), Tracing::FlagCompact); !status) return report(status.error());
+    if (Status status = device.buildTracings(structures, Buffer(), Tracing::FlagCompact); !status)
+        return report(status.error());
     Kernel kernel = device.createKernel("trace");
     kernel.loadShaderGLSL(EXAMPLE_DIR "/main.shader", first_mask < count ? "ALPHA_TEST=1" : "");
     if (!kernel.create()) return report(kernel.error());

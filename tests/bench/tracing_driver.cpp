@@ -3,9 +3,9 @@
 // structures follow the order of the triangles, so each scene is measured in the order that it comes in and shuffled;
 // ours are sorted by the builder.
 
-#include "common/instanced_scene.h"
 #include "bench/tracing_batch.h"
 #include "bench/tracing_scenes.h"
+#include "common/instanced_scene.h"
 #include "support/hierarchies.h"
 #include "support/reference.h"
 

@@ -2,9 +2,9 @@
 // 4,608 instances and traces it with one dispatch: the recording thread's time less that of the same Vulkan calls made
 // by hand. overhead.set_instances_ms: the part of it that takes the instances and records their build.
 
-#include "common/instanced_scene.h"
 #include "bench/bench.h"
 #include "bench/raw_vulkan.h"
+#include "common/instanced_scene.h"
 
 #include <fmt/format.h>
 

@@ -1,7 +1,7 @@
 #include "bench/tracing_scenes.h"
 
-#include "common/instanced_scene.h"
 #include "accuracy/embree.h"
+#include "common/instanced_scene.h"
 #include "support/reference.h"
 
 #include <glint/geometry/primitives.h>

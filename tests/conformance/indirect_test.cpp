@@ -52,7 +52,7 @@ TEST_F(IndirectTest, CountsFromABuffer) {
     std::vector<uint32_t> words;
     for (uint32_t i = 0; i < 4; i++) words.insert(words.end(), {2, 1, 2 * i, i, 0xdeadbeef});
     const Buffer arguments = makeBuffer(words, Buffer::FlagIndirect);
-    const Buffer counts = makeBuffer(std::vector<uint32_t>{0, 1, 3, 4, 0xffffffff}, Buffer::FlagIndirect);
+    const Buffer counts = makeBuffer(std::vector<uint32_t>{0, 1, 3, 4, 9}, Buffer::FlagIndirect);
     for (uint64_t c = 0; c < 5; c++) {
         draw(color, [&](Command& list) {
             list.setPipeline(pipeline);
@@ -113,6 +113,19 @@ TEST_F(IndirectTest, ArgumentsAndCountsAreWrittenByADispatch) {
     for (uint32_t i = 0; i < size; i++)
         EXPECT_EQ(rows[i], i % 3 == 1 ? std::vector<uint32_t>() : std::vector<uint32_t>{i}) << i;
     EXPECT_EQ(read<uint32_t>(count)[0], 11u);
+}
+
+TEST_F(IndirectTest, CountThatHasRunAway) {
+    GLINT_NEED_FEATURE(FeatureIndirectCount);
+    const Buffer arguments = makeBuffer(std::vector<uint32_t>{2, 1, 0, 0, 2, 1, 2, 1}, Buffer::FlagIndirect);
+    const Buffer count = makeBuffer(std::vector<uint32_t>{0xffffffff}, Buffer::FlagIndirect);
+    draw(color, [&](Command& list) {
+        list.setPipeline(pipeline);
+        list.drawArraysIndirect(arguments, 0, count, 0, 2);
+    });
+    const std::vector<std::vector<uint32_t>> rows = drawn();
+    for (uint32_t i = 0; i < size; i++)
+        EXPECT_EQ(rows[i], i < 2 ? (std::vector<uint32_t>{2 * i, 2 * i + 1}) : std::vector<uint32_t>()) << "row " << i;
 }
 
 TEST_F(IndirectTest, CountsOfThousands) {

@@ -269,6 +269,41 @@ TEST_F(RasterizerTest, CutTrianglesCoverEachPixelOnce) {
     EXPECT_GT(clipped, 500u);
 }
 
+TEST_F(RasterizerTest, CutTrianglesWithCornersOnCentres) {
+    // Wheels: a hub and its rim on pixels' centres, and around them triangles that reach beyond what fixed point holds,
+    // so that polygons with corners and level edges on lines of centres are what is left of them.
+    const Vector2u size(64, 64);
+    const auto centre = [](int pixel) { return (static_cast<float>(pixel) + 0.5f) / 32.0f - 1.0f; };
+    Rasterizer rasterizer = create(counting());
+    std::mt19937 random(21);
+    uint64_t clipped = 0;
+    for (int i = 0; i < 60; i++) {
+        Triangles wheel;
+        const int x = 24 + static_cast<int>(random() % 16), y = 24 + static_cast<int>(random() % 16);
+        wheel.positions.emplace_back(centre(x), centre(y), 0.5f);
+        // Eight directions, of which every second one is along a line of centres.
+        for (int k = 0; k < 8; k++) {
+            const int dx = k % 4 == 2 ? 0 : k < 2 || k > 6 ? 1 : -1, dy = k % 4 == 0 ? 0 : k < 4 ? 1 : -1;
+            const int reach = 1 + static_cast<int>(random() % 16);
+            wheel.positions.emplace_back(centre(x + dx * reach), centre(y + dy * reach), 0.5f);
+            const float far = between(random, 3000.0f, 9000.0f);
+            wheel.positions.emplace_back(centre(x) + static_cast<float>(dx) * far,
+                                         centre(y) + static_cast<float>(dy) * far, 0.5f);
+        }
+        for (uint32_t k = 0; k < 8; k++) {
+            const uint32_t rim = 1 + 2 * k, next = 1 + 2 * ((k + 1) % 8);
+            wheel.indices.insert(wheel.indices.end(), {0, rim, next});
+            if (random() % 2 == 0)
+                wheel.indices.insert(wheel.indices.end(), {rim, rim + 1, next + 1, rim, next + 1, next});
+            else
+                wheel.indices.insert(wheel.indices.end(), {rim, rim + 1, next, rim + 1, next + 1, next});
+        }
+        expectOnce(draw(rasterizer, wheel, size), 1, "wheel " + std::to_string(i));
+        clipped += rasterizer.getStatistics().clipped;
+    }
+    EXPECT_EQ(clipped, 60u * 16u);
+}
+
 namespace {
 
 /// A grid of cells over [-1.1, 1.1]^2 whose corners are moved by up to `jitter` cells, with random diagonals.

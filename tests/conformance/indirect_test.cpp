@@ -131,7 +131,8 @@ TEST_F(IndirectTest, CountThatHasRunAway) {
 TEST_F(IndirectTest, CountsOfThousands) {
     GLINT_NEED_FEATURE(FeatureIndirectCount);
     constexpr uint32_t draws = 5000;
-    if (device.getFeatures().maxIndirectDraws < draws) GTEST_SKIP() << "one command takes fewer draws";
+    if (device.getFeatures().maxIndirectDraws < draws)
+        GTEST_SKIP() << "one command takes " << device.getFeatures().maxIndirectDraws << " draws, this wants " << draws;
     std::vector<uint32_t> words;
     for (uint32_t i = 0; i < draws; i++) words.insert(words.end(), {1, 1, i % 16, i / 16 % 16});
     const Buffer arguments = makeBuffer(words, Buffer::FlagIndirect);

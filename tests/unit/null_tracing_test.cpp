@@ -1,6 +1,7 @@
 // Acceleration structures on the null device: what is built, compacted and followed, in both engines.
 
 #include "null_device.h"
+#include "random_program.h"
 
 #include <glint/device/detail/device_object.h>
 
@@ -10,16 +11,6 @@ namespace glint::test {
 namespace {
 
 using NullTracing = NullDevice;
-
-constexpr const char* trace_kernel = R"(
-layout(local_size_x = 8) in;
-layout(binding = 0) uniform accelerationStructureEXT scene;
-layout(binding = 1) buffer To { uint to[]; };
-void main() {
-    rayQueryEXT query;
-    rayQueryInitializeEXT(query, scene, 0u, 0xffu, vec3(0.0), 0.0, vec3(1.0), 1.0);
-    to[gl_GlobalInvocationID.x] = rayQueryProceedEXT(query) ? 1u : 0u;
-})";
 
 TEST_F(NullTracing, StructuresAreBuiltCompactedAndFollowed) {
     const Buffer vertices = device.createBuffer(Buffer::FlagTracing, 36 * 100, "vertices");

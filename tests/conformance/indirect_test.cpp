@@ -117,6 +117,9 @@ TEST_F(IndirectTest, ArgumentsAndCountsAreWrittenByADispatch) {
 
 TEST_F(IndirectTest, CountThatHasRunAway) {
     GLINT_NEED_FEATURE(FeatureIndirectCount);
+    // It takes the device away from all programs until the process is ended.
+    if (device.getInfo().vendor_id == 0x10de)
+        GTEST_SKIP() << device.getInfo().name << ": NVIDIA's driver 580.159 never comes back from this count";
     const Buffer arguments = makeBuffer(std::vector<uint32_t>{2, 1, 0, 0, 2, 1, 2, 1}, Buffer::FlagIndirect);
     const Buffer count = makeBuffer(std::vector<uint32_t>{0xffffffff}, Buffer::FlagIndirect);
     draw(color, [&](Command& list) {

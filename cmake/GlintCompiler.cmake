@@ -12,7 +12,9 @@ endif()
 
 find_program(GLINT_CCACHE ccache)
 if(GLINT_CCACHE AND NOT CMAKE_CXX_COMPILER_LAUNCHER)
-    set(CMAKE_CXX_COMPILER_LAUNCHER "${GLINT_CCACHE}")
+    # What it has to be told to keep what precompiled headers were used for.
+    set(CMAKE_CXX_COMPILER_LAUNCHER
+        "${CMAKE_COMMAND}" -E env CCACHE_SLOPPINESS=pch_defines,time_macros "${GLINT_CCACHE}")
 endif()
 
 # How Glint's own code is compiled; what users of the library compile with is their affair.

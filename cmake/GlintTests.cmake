@@ -1,3 +1,13 @@
+# What nearly every test includes, parsed once: a quarter of the time that tests take to compile.
+function(glint_precompile_test_headers)
+    file(WRITE "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp" "")
+    add_executable(test_headers EXCLUDE_FROM_ALL "${CMAKE_CURRENT_BINARY_DIR}/test_headers.cpp")
+    target_link_libraries(test_headers PRIVATE glint_options test_support)
+    target_compile_options(test_headers PRIVATE -O0)
+    target_precompile_headers(test_headers PRIVATE <gmock/gmock.h> <gtest/gtest.h> <fmt/format.h> <algorithm> <array>
+        <cmath> <filesystem> <fstream> <functional> <map> <memory> <random> <span> <string> <thread> <vector>)
+endfunction()
+
 # glint_test(name labels sources...): a GoogleTest program and its ctest entry. Suites whose name ends in `Long` go to a
 # second entry, labelled `long`, if there are any.
 
@@ -8,6 +18,7 @@ function(glint_test name labels)
     target_link_libraries(${name} PRIVATE glint_options test_support)
     # Checks are compiled more often than they are run.
     target_compile_options(${name} PRIVATE -O0)
+    target_precompile_headers(${name} REUSE_FROM test_headers)
     if(NOT EXISTS "${PROJECT_SOURCE_DIR}/tests/support/main.cpp")
         target_link_libraries(${name} PRIVATE GTest::gtest_main)
     endif()

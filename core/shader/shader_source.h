@@ -86,6 +86,10 @@ Status checkEntry(const ShaderSource& source, std::span<const uint32_t> words);
 /// `optimize` for words that have passed `findFault`.
 Expected<std::vector<uint32_t>> optimizeValid(const ShaderSource& source, std::span<const uint32_t> words);
 
+/// A valid module in which entry points call no functions, but for those that cannot be made part of their callers.
+/// Error: "shader.tracing_internal".
+Expected<std::vector<uint32_t>> inlineFunctions(std::span<const uint32_t> words);
+
 /// A valid module with these values (ids and bits) of its specialisation constants, which are constants as any others
 /// afterwards. Error: "shader.tracing_internal".
 Expected<std::vector<uint32_t>> fixConstants(std::span<const uint32_t> words,

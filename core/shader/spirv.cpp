@@ -199,6 +199,23 @@ Expected<std::vector<uint32_t>> fixConstants(std::span<const uint32_t> words,
         makeError(ErrorCode::Internal, "shader.tracing_internal", "constants cannot be fixed: {}", complaint.text));
 }
 
+Expected<std::vector<uint32_t>> inlineFunctions(std::span<const uint32_t> words) {
+    Complaint complaint;
+    spvtools::Optimizer optimizer(environment);
+    optimizer.SetMessageConsumer(complaint.consumer());
+    optimizer.RegisterPass(spvtools::CreateMergeReturnPass());
+    optimizer.RegisterPass(spvtools::CreateInlineExhaustivePass());
+    optimizer.RegisterPass(spvtools::CreateEliminateDeadFunctionsPass());
+    spvtools::OptimizerOptions options;
+    options.set_run_validator(false);
+    std::vector<uint32_t> result;
+    if (optimizer.Run(words.data(), words.size(), &result, options)) return result;
+    return unexpected(makeError(ErrorCode::Internal, "shader.tracing_internal",
+                                "functions cannot be made part of their "
+                                "callers: {}",
+                                complaint.text));
+}
+
 std::string disassemble(std::span<const uint32_t> words) {
     const std::vector<uint32_t> native = nativeWords(words);
     spvtools::SpirvTools tools(environment);

@@ -38,6 +38,8 @@ bool isComputeInput(uint32_t built_in) {
            built_in == spv::BuiltInDeviceIndex;
 }
 
+constexpr uint32_t no_stage = 0xffff;  // GLINT_NO_STAGE
+
 bool endsStage(uint32_t opcode) {
     return opcode == spv::OpIgnoreIntersectionKHR || opcode == spv::OpTerminateRayKHR ||
            opcode == spv::OpReportIntersectionKHR;
@@ -66,7 +68,10 @@ void StageCopier::copy(JoinedModule& module, ShaderStage stage, uint32_t level, 
             if (item.has_result) local_[item.result()] = builder_.newId();
     addVariables();
     findUnwinding();
-    writeWrapper(id);
+    if (module.cut.empty())
+        writeWrapper(id);
+    else
+        writePieces(id);
     for (const uint32_t function : module.reached) copyFunction(*module.functions.at(function));
     copyNotes();
 }
@@ -75,6 +80,10 @@ void StageCopier::addVariables() {
     records_.clear();
     for (const auto& [id, variable] : module_->own) {
         if (variable.storage_class == spv::StorageClassShaderRecordBufferKHR) records_.insert(id);
+        if (id == module_->cut.next) {
+            local_[id] = frame("glint_piece");
+            continue;
+        }
         local_[id] = builder_.newId();
         const uint32_t storage_class = spv::StorageClassPrivate;
         builder_.addGlobal(Instruction(spv::OpVariable, variable.pointer, local_[id], std::array{storage_class}, 0));
@@ -105,7 +114,7 @@ void StageCopier::readBuiltIn(const StageVariable& variable) {
     emitStore(variableHere(variable), value);
 }
 
-void StageCopier::writeWrapper(uint32_t id) {
+void StageCopier::beginFunction(uint32_t id) {
     const uint32_t void_type = builder_.shared(spv::OpTypeVoid, 0, {});
     const uint32_t function_type = builder_.shared(spv::OpTypeFunction, 0, {void_type});
     Instruction head(spv::OpFunction, void_type, id, std::array{0u, function_type});
@@ -113,7 +122,16 @@ void StageCopier::writeWrapper(uint32_t id) {
     body_.clear();
     body_.push_back(std::move(head));
     emitLabel(builder_.newId());
+}
 
+void StageCopier::endFunction() {
+    body_.emplace_back(spv::OpReturn, 0, 0, std::span<const uint32_t>());
+    body_.emplace_back(spv::OpFunctionEnd, 0, 0, std::span<const uint32_t>());
+    builder_.module.functions.push_back(std::move(body_));
+    body_.clear();
+}
+
+void StageCopier::writeStart() {
     // Attributes are an intersection shader's to write.
     const bool reads_attributes = stage_ != ShaderStage::Intersection;
     const ValueWords& values = joiner_.values();
@@ -123,35 +141,123 @@ void StageCopier::writeWrapper(uint32_t id) {
         switch (variable.storage_class) {
             case spv::StorageClassInput: readBuiltIn(variable); break;
             case spv::StorageClassIncomingRayPayloadKHR:
-                values.load(body_, variable.type, here, names_.payload, 0, true);
+                values.load(body_, variable.type, here, names_.payload, true);
                 break;
             case spv::StorageClassIncomingCallableDataKHR:
-                values.load(body_, variable.type, here, names_.callable, 0, true);
+                values.load(body_, variable.type, here, names_.callable, true);
                 break;
             case spv::StorageClassHitAttributeKHR:
-                if (reads_attributes) values.load(body_, variable.type, here, names_.attributes, 0, true);
+                if (reads_attributes) values.load(body_, variable.type, here, names_.attributes, true);
                 break;
-            case spv::StorageClassPushConstant: values.load(body_, variable.type, here, names_.push, 0, false); break;
+            case spv::StorageClassPushConstant: values.load(body_, variable.type, here, names_.push, false); break;
             case spv::StorageClassShaderRecordBufferKHR:
                 if (!record) record = emit(spv::OpLoad, builder_.uintType(), std::array{frame("glint_record")});
-                values.load(body_, variable.type, here, names_.records, record, false);
+                values.load(body_, variable.type, here, names_.records.from(record), false);
                 break;
             default:
                 // At every call of the stage, not once.
                 if (variable.initializer) emitStore(here, variable.initializer);
         }
     }
-    emit(spv::OpFunctionCall, void_type, std::array{local_.at(module_->entry)});
+}
+
+void StageCopier::writeFinish() {
     for (const auto& [name, variable] : module_->own) {
         if (variable.storage_class == spv::StorageClassIncomingRayPayloadKHR)
-            values.store(body_, variable.type, variableHere(variable), names_.payload);
+            joiner_.values().store(body_, variable.type, variableHere(variable), names_.payload);
         if (variable.storage_class == spv::StorageClassIncomingCallableDataKHR)
-            values.store(body_, variable.type, variableHere(variable), names_.callable);
+            joiner_.values().store(body_, variable.type, variableHere(variable), names_.callable);
     }
-    body_.emplace_back(spv::OpReturn, 0, 0, std::span<const uint32_t>());
-    body_.emplace_back(spv::OpFunctionEnd, 0, 0, std::span<const uint32_t>());
-    builder_.module.functions.push_back(std::move(body_));
-    body_.clear();
+}
+
+void StageCopier::writeWrapper(uint32_t id) {
+    beginFunction(id);
+    writeStart();
+    emit(spv::OpFunctionCall, builder_.shared(spv::OpTypeVoid, 0, {}), std::array{local_.at(module_->entry)});
+    writeFinish();
+    endFunction();
+}
+
+/// The pieces one after the other: a branch forwards is taken at once, and one backwards when the function is called
+/// again.
+void StageCopier::writePieces(uint32_t id) {
+    beginFunction(id);
+    const std::vector<StagePiece>& pieces = module_->cut.pieces;
+    const uint32_t bool_type = builder_.boolType();
+    for (uint32_t i = 0; i <= pieces.size(); i++) {
+        const uint32_t next = emit(spv::OpLoad, builder_.uintType(), std::array{frame("glint_piece")});
+        uint32_t is_next = emit(spv::OpIEqual, bool_type, std::array{next, builder_.constant(i)});
+        const bool resumes = i < pieces.size() && pieces[i].payload;
+        if (resumes) {
+            // It is the next already while its ray is asked for.
+            const uint32_t asks = emit(spv::OpLoad, bool_type, std::array{frame("glint_asks")});
+            const uint32_t is_back = emit(spv::OpLogicalNot, bool_type, std::array{asks});
+            is_next = emit(spv::OpLogicalAnd, bool_type, std::array{is_next, is_back});
+        }
+        writeIf(is_next, [&] {
+            if (i == 0) writeStart();
+            if (resumes) writeSaved(pieces[i], false);
+            if (i < pieces.size()) {
+                emit(spv::OpFunctionCall, builder_.shared(spv::OpTypeVoid, 0, {}),
+                     std::array{local_.at(pieces[i].function)});
+            } else {
+                writeFinish();
+                emitStore(frame("glint_stage"), builder_.constant(no_stage));
+            }
+        });
+    }
+    endFunction();
+}
+
+void StageCopier::writeIf(uint32_t condition, const std::function<void()>& body) {
+    const uint32_t then = builder_.newId(), after = builder_.newId();
+    body_.emplace_back(spv::OpSelectionMerge, 0, 0, std::array{after, 0u}, 1);
+    body_.emplace_back(spv::OpBranchConditional, 0, 0, std::array{condition, then, after});
+    emitLabel(then);
+    body();
+    body_.emplace_back(spv::OpBranch, 0, 0, std::array{after});
+    emitLabel(after);
+}
+
+/// The words of the stage's level.
+WordArray StageCopier::savedWords() {
+    if (depth_ == 2) return names_.saved;
+    const uint32_t uint_type = builder_.uintType();
+    const uint32_t level = emit(spv::OpLoad, uint_type, std::array{frame("glint_level")});
+    const uint32_t frame = emit(spv::OpISub, uint_type, std::array{level, builder_.constant(1)});
+    return names_.saved.from(emit(spv::OpIMul, uint_type, std::array{frame, builder_.constant(saved_words_)}));
+}
+
+/// What the stage knows is put away before a trace, or found again in `piece` after it, with the payload. A call of the
+/// stage at a deeper level would overwrite it; ray generation has no other. Where rays nest no deeper, none is asked
+/// for and nothing has happened.
+void StageCopier::writeSaved(const StagePiece& piece, bool saves) {
+    const ValueWords& values = joiner_.values();
+    const auto handOn = [&] {
+        if (isNested() && !piece.live.empty()) {
+            WordArray words = savedWords();
+            for (const uint32_t id : piece.live) {
+                const StageVariable& variable = module_->own.at(id);
+                if (saves)
+                    values.store(body_, variable.type, variableHere(variable), words);
+                else
+                    values.load(body_, variable.type, variableHere(variable), words, true);
+                words.offset += values.count(variable.type, true, "a variable");
+            }
+        }
+        const StageVariable& payload = ownVariable(piece.payload, "traceRayEXT");
+        if (saves)
+            values.store(body_, payload.type, variableHere(payload), names_.payload);
+        else
+            values.load(body_, payload.type, variableHere(payload), names_.payload, true);
+    };
+    if (saves || !isNested()) return handOn();
+    writeIf(isAbove(), handOn);
+}
+
+uint32_t StageCopier::isAbove() {
+    const uint32_t level = emit(spv::OpLoad, builder_.uintType(), std::array{frame("glint_level")});
+    return emit(spv::OpULessThan, builder_.boolType(), std::array{level, builder_.constant(depth_)});
 }
 
 // The stage's own code.
@@ -173,6 +279,12 @@ void StageCopier::copyFunction(const Instructions& function) {
     body_.clear();
     continues_.clear();
     ends_.clear();
+    piece_ = nullptr;
+    for (const StagePiece& piece : module_->cut.pieces)
+        if (piece.function == function[0].result()) piece_ = &piece;
+    definitions_.clear();
+    for (const Instruction& item : function)
+        if (item.has_result) definitions_[item.result()] = &item;
     return_type_ = idHere(function[0].type());
     for (const Instruction& item : function)
         if (item.opcode == spv::OpLoopMerge) continues_.insert(idHere(item.operands()[1]));
@@ -231,21 +343,113 @@ void StageCopier::copyInstruction(const Instruction& original) {
 }
 
 void StageCopier::writeTrace(const Instruction& original) {
-    const uint32_t level = level_ + 1;
-    if (level > trace_levels_) return;
-    std::vector<uint32_t> values;
-    for (const uint32_t operand : original.operands()) values.push_back(idHere(operand));
-    const StageVariable& payload = ownVariable(original.operands()[10], "traceRayEXT");
-    for (size_t i = 1; i < 6; i++) values[i] = asUint(values[i]);
-    // Flags of pipelines alone are none of a query's.
-    const uint32_t known = builder_.constant(~uint32_t(spv::RayFlagsSkipClosestHitShaderKHRMask));
-    const uint32_t flags = emit(spv::OpBitwiseAnd, builder_.uintType(), std::array{values[1], known});
-    const uint32_t query = frame(fmt::format("glint_query{}", level).c_str());
-    body_.emplace_back(spv::OpRayQueryInitializeKHR, 0, 0,
-                       std::array{query, values[0], flags, values[2], values[6], values[7], values[8], values[9]});
-    joiner_.values().store(body_, payload.type, variableHere(payload), names_.payload);
-    call(fmt::format("glintTrace{}", level), {values.begin() + 1, values.begin() + 10});
-    joiner_.values().load(body_, payload.type, variableHere(payload), names_.payload, 0, true);
+    // Beyond the recursion depth it does nothing.
+    if (!piece_) return;
+    const auto ask = [&] {
+        writeSaved(module_->cut.pieces[piece_->after], true);
+        writeStructure(original.operands()[0]);
+        std::vector<uint32_t> values;
+        for (const uint32_t operand : original.operands().subspan(1, 9)) values.push_back(idHere(operand));
+        for (size_t i = 0; i < 5; i++) values[i] = asUint(values[i]);
+        call("glintAsk", std::move(values));
+    };
+    if (!isNested()) return ask();
+    writeIf(isAbove(), ask);
+}
+
+/// Says which structure a ray is for: no variable can hold one, so that it is loaded again where the search begins.
+void StageCopier::writeStructure(uint32_t id) {
+    const Instruction* item = definitions_.at(id);
+    while (item->opcode == spv::OpCopyObject) item = definitions_.at(item->operands()[0]);
+    Structure structure;
+    structure.type = idHere(item->type());
+    const uint32_t uint_type = builder_.uintType();
+    const uint32_t pair_type = builder_.shared(spv::OpTypeVector, 0, {uint_type, 2}, 1);
+    const char* const unknown = "a branch chooses the structure that its traceRayEXT is for";
+    if (item->opcode == spv::OpConvertUToAccelerationStructureKHR) {
+        uint32_t address = idHere(item->operands()[0]);
+        if (builder_.typeOf(address) != pair_type) address = emit(spv::OpBitcast, pair_type, std::array{address});
+        emitStore(frame("glint_structure_place"), address);
+    } else if (item->opcode == spv::OpLoad) {
+        uint32_t variable = item->operands()[0];
+        if (const auto chain = definitions_.find(variable); chain != definitions_.end()) {
+            const Instruction& place = *chain->second;
+            if (place.operands().size() != 2 ||
+                (place.opcode != spv::OpAccessChain && place.opcode != spv::OpInBoundsAccessChain))
+                unsupported(unknown);
+            variable = place.operands()[0];
+            structure.element = idHere(place.type());
+            const uint32_t index = asUint(idHere(place.operands()[1]));
+            emitStore(frame("glint_structure_place"),
+                      emit(spv::OpCompositeConstruct, pair_type, std::array{index, index}));
+        }
+        if (definitions_.contains(variable)) unsupported(unknown);
+        structure.variable = idHere(variable);
+        // The stages' declarations of a resource are different variables.
+        std::array<uint32_t, 3> key = {structure.variable, 0, builder_.typeOf(structure.variable)};
+        for (const Instruction* note : module_->notes[variable]) {
+            if (note->opcode != spv::OpDecorate || note->operands().size() < 3) continue;
+            if (note->operands()[1] == spv::DecorationDescriptorSet) key[0] = note->operands()[2];
+            if (note->operands()[1] == spv::DecorationBinding) key[1] = note->operands()[2];
+        }
+        structure.variable = places_.try_emplace(key, structure.variable).first->second;
+    } else {
+        unsupported(unknown);
+    }
+    auto known = std::ranges::find(structures_, structure);
+    if (known == structures_.end()) known = structures_.insert(known, structure);
+    emitStore(frame("glint_structure"), builder_.constant(static_cast<uint32_t>(known - structures_.begin())));
+}
+
+void StageCopier::writeBegin(uint32_t id, uint32_t flags_pointer) {
+    const uint32_t void_type = builder_.shared(spv::OpTypeVoid, 0, {});
+    const uint32_t uint_type = builder_.uintType();
+    const uint32_t flags = builder_.newId();
+    Instruction head(spv::OpFunction, void_type, id,
+                     std::array{0u, builder_.shared(spv::OpTypeFunction, 0, {void_type, flags_pointer})});
+    head.ids = {1, 2, 4};
+    body_.clear();
+    body_.push_back(std::move(head));
+    body_.emplace_back(spv::OpFunctionParameter, flags_pointer, flags, std::span<const uint32_t>());
+    emitLabel(builder_.newId());
+    const auto load = [&](const char* name) {
+        const SkeletonNames::Variable& variable = names_.variables.at(name);
+        return emit(spv::OpLoad, variable.type, std::array{variable.id});
+    };
+    for (uint32_t i = 0; i < structures_.size(); i++) {
+        const Structure& structure = structures_[i];
+        const auto begin = [&] {
+            uint32_t value = 0;
+            if (!structure.variable) {
+                const uint32_t address = load("glint_structure_place");
+                value = emit(spv::OpConvertUToAccelerationStructureKHR, structure.type, std::array{address});
+            } else {
+                uint32_t place = structure.variable;
+                if (structure.element) {
+                    const uint32_t pair = load("glint_structure_place"), index = builder_.newId();
+                    body_.emplace_back(spv::OpCompositeExtract, uint_type, index, std::array{pair, 0u}, 1);
+                    place = emit(spv::OpAccessChain, structure.element, std::array{place, index});
+                }
+                value = emit(spv::OpLoad, structure.type, std::array{place});
+            }
+            const std::array operands = {frame("glint_query"),
+                                         value,
+                                         flags,
+                                         load("glint_cull_mask"),
+                                         load("glint_world_origin"),
+                                         load("glint_t_min"),
+                                         load("glint_world_direction"),
+                                         load("glint_ray_end")};
+            body_.emplace_back(spv::OpRayQueryInitializeKHR, 0, 0, operands);
+        };
+        if (structures_.size() == 1) {
+            begin();
+            break;
+        }
+        const uint32_t which = load("glint_structure");
+        writeIf(emit(spv::OpIEqual, builder_.boolType(), std::array{which, builder_.constant(i)}), begin);
+    }
+    endFunction();
 }
 
 void StageCopier::writeCallable(const Instruction& original) {
@@ -255,7 +459,7 @@ void StageCopier::writeCallable(const Instruction& original) {
     const uint32_t index = asUint(idHere(original.operands()[0]));
     joiner_.values().store(body_, data.type, variableHere(data), names_.callable);
     call(fmt::format("glintCallable{}", level), {index});
-    joiner_.values().load(body_, data.type, variableHere(data), names_.callable, 0, true);
+    joiner_.values().load(body_, data.type, variableHere(data), names_.callable, true);
 }
 
 void StageCopier::writeReport(const Instruction& original) {

@@ -5,6 +5,8 @@
 #include "traversal_module.h"
 #include "traversal_skeleton.h"
 
+#include <functional>
+
 namespace glint::shader {
 
 /// The skeleton's functions and variables, by their names.
@@ -15,7 +17,7 @@ struct SkeletonNames {
     };
     std::unordered_map<std::string, uint32_t> functions;
     std::unordered_map<std::string, Variable> variables;
-    WordArray payload, callable, attributes, records, push;
+    WordArray payload, callable, attributes, records, push, saved;
 };
 
 /// A built-in variable of a stage: what has it in the frame, and what it takes to have it there.
@@ -30,26 +32,41 @@ const FrameVariable* frameVariable(uint32_t built_in);
 /// Writes copies of stages into the joined module.
 class StageCopier {
 public:
-    StageCopier(SpirvBuilder& builder, ModuleJoiner& joiner, const SkeletonNames& names, uint32_t trace_levels,
-                uint32_t callable_levels)
+    StageCopier(SpirvBuilder& builder, ModuleJoiner& joiner, const SkeletonNames& names, uint32_t depth,
+                uint32_t callable_levels, uint32_t saved_words)
         : builder_(builder),
           joiner_(joiner),
           names_(names),
-          trace_levels_(trace_levels),
-          callable_levels_(callable_levels) {}
+          depth_(depth),
+          callable_levels_(callable_levels),
+          saved_words_(saved_words) {}
 
-    /// `id` becomes a function without parameters that does what the stage does. Throws RewriteRefusal.
+    /// `id` becomes a function without parameters that does what the stage does; of one that has pieces it runs those
+    /// that can run now. Throws RewriteRefusal.
     void copy(JoinedModule& module, ShaderStage stage, uint32_t level, uint32_t id);
+    /// Once all are copied: `id` becomes the skeleton's glintBegin, for the structures that the stages trace.
+    void writeBegin(uint32_t id, uint32_t flags_pointer);
 
 private:
     void addVariables();
+    void beginFunction(uint32_t id);
+    void endFunction();
+    void writeStart();
+    void writeFinish();
     void writeWrapper(uint32_t id);
+    void writePieces(uint32_t id);
+    uint32_t isAbove();
+    void writeSaved(const StagePiece& piece, bool saves);
+    WordArray savedWords();
+    void writeIf(uint32_t condition, const std::function<void()>& body);
+    bool isNested() const { return stage_ != ShaderStage::RayGen; }
     void readBuiltIn(const StageVariable& variable);
     void findUnwinding();
     void copyFunction(const Instructions& function);
     void copyInstruction(const Instruction& original);
     void copyNotes();
     void writeTrace(const Instruction& original);
+    void writeStructure(uint32_t id);
     void writeCallable(const Instruction& original);
     void writeReport(const Instruction& original);
     void writeEnd(const char* flag);
@@ -70,9 +87,20 @@ private:
     SpirvBuilder& builder_;
     ModuleJoiner& joiner_;
     const SkeletonNames& names_;
-    const uint32_t trace_levels_;
+    const uint32_t depth_;
     const uint32_t callable_levels_;
+    const uint32_t saved_words_;
     std::map<uint32_t, SkeletonNames::Variable> inputs_;  ///< of compute shaders, by their built-in
+
+    /// A structure that stages trace: a variable, an element of one, or an address.
+    struct Structure {
+        uint32_t variable = 0;  ///< 0 for an address
+        uint32_t type = 0;      ///< of structures
+        uint32_t element = 0;   ///< of a place in the variable, 0 if it has none
+        bool operator==(const Structure&) const = default;
+    };
+    std::vector<Structure> structures_;
+    std::map<std::array<uint32_t, 3>, uint32_t> places_;  ///< a variable, by its set, binding and type
 
     // Of the copy in the making.
     JoinedModule* module_ = nullptr;
@@ -83,6 +111,8 @@ private:
     std::unordered_set<uint32_t> records_;    ///< pointers to the record's data, or into it
     Instructions body_;
     // Of the function in the making.
+    const StagePiece* piece_ = nullptr;
+    std::unordered_map<uint32_t, const Instruction*> definitions_;
     uint32_t return_type_ = 0;
     uint32_t label_ = 0;
     std::unordered_set<uint32_t> continues_;

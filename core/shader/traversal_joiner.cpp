@@ -6,6 +6,10 @@
 
 #include <glint/base/format_error.h>
 
+#include <spirv/unified1/spirv.hpp>
+
+#include <algorithm>
+
 namespace glint::shader {
 
 namespace {
@@ -16,8 +20,19 @@ Error internalError(const TraversalSource& source, std::string_view what) {
     return makeError(ErrorCode::Internal, "shader.tracing_internal", "the joined pipeline '{}': {}", source.name, what);
 }
 
+bool has(const SpirvModule& module, uint32_t opcode) {
+    return std::ranges::any_of(module.functions, [&](const Instructions& function) {
+        return std::ranges::any_of(function, [&](const Instruction& item) { return item.opcode == opcode; });
+    });
+}
+
 Expected<SpirvModule> stageModule(const TraversalSource::Stage& stage) {
     Expected<std::vector<uint32_t>> fixed = fixConstants(stage.words, stage.constants);
+    if (!fixed) return unexpected(fixed.error());
+    Expected<SpirvModule> module = SpirvModule::parse(*fixed);
+    // What may be cut at its traces has to be one function.
+    if (!module || !has(*module, spv::OpTraceRayKHR) || !has(*module, spv::OpFunctionCall)) return module;
+    fixed = inlineFunctions(*fixed);
     if (!fixed) return unexpected(fixed.error());
     return SpirvModule::parse(*fixed);
 }

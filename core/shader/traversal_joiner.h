@@ -49,15 +49,18 @@ struct TraversalSource {
 
 /// The most words (of 32 bits) that a payload, a callable's data, an attribute or a record may have.
 constexpr uint32_t max_frame_words = 1024;
-/// The most copies of stages: those that trace are there once a level of recursion.
+/// The most words that all levels of recursion together keep: they are memory of every thread that runs, 32 KiB of it.
+constexpr uint32_t max_saved_words = 8192;
+/// The most copies of stages: callables that call others are there once for each level.
 constexpr uint32_t max_stage_copies = 256;
 
 /// One module for the compute stage that does what the pipeline does, ray by ray: shaders/tracing/pipeline.h says what
 /// its two blocks hold. Resources keep their sets and bindings, push constants their offsets; specialisation constants
 /// have become fixed. The result has been validated and is not optimised.
 /// Errors: "shader.traversal_unsupported" (what cannot be carried over, with its stage and, where the module has lines,
-/// its line), "shader.traversal_size" (a payload or a record beyond max_frame_words, more copies than
-/// max_stage_copies), "shader.tracing_internal" (a fault of ours, with the module that came of it).
+/// its line), "shader.traversal_size" (a payload or a record beyond max_frame_words, recursion beyond
+/// max_saved_words, more copies than max_stage_copies), "shader.tracing_internal" (a fault of ours, with the module
+/// that came of it).
 Expected<std::vector<uint32_t>> joinTraversal(const TraversalSource& source);
 
 }  // namespace glint::shader

@@ -29,9 +29,18 @@ public:
 
     /// The types and resources of all stages.
     SkeletonNeeds addStages() {
-        for (JoinedModule& stage : stages_) joiner_.add(stage);
+        for (size_t i = 0; i < stages_.size(); i++) {
+            cut(stages_[i], source_.stages[i].stage);
+            joiner_.add(stages_[i]);
+        }
         SkeletonNeeds needs;
         for (const JoinedModule& stage : stages_) addNeeds(needs, stage);
+        const uint32_t depth = traceDepth(source_, needs), levels = depth > 1 ? depth - 1 : 0;
+        if (uint64_t(levels) * needs.saved_words > max_saved_words)
+            throw RewriteRefusal{
+                ErrorCode::Unsupported, "shader.traversal_size",
+                fmt::format("recursion depth {} keeps {} words for each of {} levels, at most {} in all can be",
+                            source_.recursion_depth, needs.saved_words, levels, max_saved_words)};
         return needs;
     }
 
@@ -45,9 +54,10 @@ public:
         const std::vector<StageCopy> copies = stageCopies(source_, needs);
         if (copies.size() > max_stage_copies)
             throw RewriteRefusal{ErrorCode::Unsupported, "shader.traversal_size",
-                                 fmt::format("recursion depth {} makes {} copies of {} shaders, at most {} can be",
-                                             source_.recursion_depth, copies.size(), stages_.size(), max_stage_copies)};
-        StageCopier copier(builder_, joiner_, names_, traceLevels(source_, needs), callableLevels(source_, needs));
+                                 fmt::format("callable depth {} makes {} copies of {} shaders, at most {} can be",
+                                             source_.callable_depth, copies.size(), stages_.size(), max_stage_copies)};
+        StageCopier copier(builder_, joiner_, names_, traceDepth(source_, needs), callableLevels(source_, needs),
+                           needs.saved_words);
         std::unordered_set<uint32_t> stand_ins;
         for (const StageCopy& copy : copies) {
             // The skeleton calls the copy in the place of its own, empty function.
@@ -56,6 +66,9 @@ public:
             copier.copy(stages_[copy.stage], source_.stages[copy.stage].stage, copy.level,
                         joiner_.idOf(skeleton_, function));
         }
+        const uint32_t begin = functionNamed("glintBegin");
+        stand_ins.insert(begin);
+        copier.writeBegin(joiner_.idOf(skeleton_, begin), parameterOf(begin));
         for (const Instructions& function : skeleton_.spirv.functions)
             if (!stand_ins.contains(function[0].result())) addSkeletonFunction(function);
         finish();
@@ -70,16 +83,36 @@ private:
         internal(fmt::format("{} has no entry point '{}'", module.title, stage.entry));
     }
 
+    /// Stages that may trace at their level; of others traces are left out.
+    void cut(JoinedModule& stage, ShaderStage kind) {
+        if (source_.recursion_depth < (kind == ShaderStage::RayGen ? 1u : 2u) || !traces(stage.spirv, stage.entry))
+            return;
+        try {
+            stage.cut = cutAtTraces(stage.spirv, stage.entry);
+        } catch (RewriteRefusal& refusal) {
+            refusal.message = fmt::format("{}: {}", stage.title, refusal.message);
+            throw;
+        }
+    }
+
     void addNeeds(SkeletonNeeds& needs, const JoinedModule& stage) {
-        bool traces = false, calls = false;
+        bool calls = false;
         for (const uint32_t function : stage.reached)
-            for (const Instruction& item : *stage.functions.at(function)) {
-                traces = traces || item.opcode == spv::OpTraceRayKHR;
+            for (const Instruction& item : *stage.functions.at(function))
                 calls = calls || item.opcode == spv::OpExecuteCallableKHR;
-            }
-        needs.traces.push_back(traces);
+        needs.resumes.push_back(!stage.cut.empty());
         needs.calls.push_back(calls);
+        if (source_.stages[needs.calls.size() - 1].stage != ShaderStage::RayGen) addSaved(needs, stage);
         for (const auto& [id, variable] : stage.own) addNeeds(needs, stage, variable);
+    }
+
+    void addSaved(SkeletonNeeds& needs, const JoinedModule& stage) {
+        const std::string what = fmt::format("{}: what it goes on with after traceRayEXT", stage.title);
+        for (const StagePiece& piece : stage.cut.pieces) {
+            uint32_t words = 0;
+            for (const uint32_t id : piece.live) words += joiner_.values().count(stage.own.at(id).type, true, what);
+            needs.saved_words = std::max(needs.saved_words, words);
+        }
     }
 
     void addNeeds(SkeletonNeeds& needs, const JoinedModule& stage, const StageVariable& variable) {
@@ -104,6 +137,13 @@ private:
                 break;
             default: break;
         }
+    }
+
+    /// The type of a function's parameter.
+    uint32_t parameterOf(uint32_t id) {
+        for (const Instructions& function : skeleton_.spirv.functions)
+            if (function[0].result() == id) return joiner_.idOf(skeleton_, function[1].type());
+        internal("a stand-in has no parameter");
     }
 
     /// Of the skeleton: its names of functions end with a parenthesis and their parameters.
@@ -134,6 +174,7 @@ private:
         };
         names_.payload = words("glint_payload", spv::StorageClassPrivate, false);
         names_.callable = words("glint_callable", spv::StorageClassPrivate, false);
+        names_.saved = words("glint_saved", spv::StorageClassPrivate, false);
         names_.attributes = words("glint_attributes", spv::StorageClassPrivate, false);
         names_.records = words("glint_records", spv::StorageClassStorageBuffer, true);
         names_.push = words("glint_push", spv::StorageClassPushConstant, true);

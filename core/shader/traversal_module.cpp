@@ -49,7 +49,8 @@ void findReached(JoinedModule& module) {
     if (!module.is_stage) {
         for (const Instructions& function : module.spirv.functions) reached.push_back(function[0].result());
     } else {
-        reached = {module.entry};
+        for (const StagePiece& piece : module.cut.pieces) reached.push_back(piece.function);
+        if (reached.empty()) reached = {module.entry};
         for (size_t i = 0; i < reached.size(); i++)
             for (const Instruction& item : *module.functions.at(reached[i]))
                 if (item.opcode == spv::OpFunctionCall && std::ranges::count(reached, item.operands()[0]) == 0)

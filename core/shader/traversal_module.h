@@ -3,6 +3,7 @@
 // For sources only: one module among those that become a pipeline's shader.
 
 #include "spirv_builder.h"
+#include "traversal_cut.h"
 #include "traversal_joiner.h"
 #include "value_words.h"
 
@@ -24,6 +25,7 @@ struct JoinedModule {
     std::string title;  ///< for messages: "the Closest shader 'name'"
     bool is_stage = true;
     uint32_t entry = 0;                          ///< function
+    StageCut cut;                                ///< instead of the entry, if it has pieces
     std::unordered_map<uint32_t, uint32_t> ids;  ///< of the module to the joined one's
     std::map<uint32_t, StageVariable> own;       ///< by the module's id
     std::unordered_map<uint32_t, const Instructions*> functions;

@@ -9,8 +9,9 @@ namespace glint::shader {
 
 /// What stages need of the skeleton.
 struct SkeletonNeeds {
-    /// Stages that call traceRayEXT or executeCallableEXT: there is one copy of those for each level.
-    std::vector<bool> traces, calls;
+    std::vector<bool> resumes;  ///< stages that have been cut at their traces
+    std::vector<bool> calls;    ///< stages that call executeCallableEXT: a callable one is there once for each level
+    uint32_t saved_words = 0;   ///< of stages that nest, for each level
     uint32_t payload_words = 0;
     uint32_t callable_words = 0;
     uint32_t attribute_words = 0;
@@ -27,16 +28,17 @@ struct StageCopy {
     uint32_t level = 0;
 };
 
-/// How deep calls are carried out, 0 if nobody calls.
-uint32_t traceLevels(const TraversalSource& source, const SkeletonNeeds& needs);
+/// How deep rays nest at which stages may trace, 0 if none does.
+uint32_t traceDepth(const TraversalSource& source, const SkeletonNeeds& needs);
+/// How deep calls of callables are carried out, 0 if nobody calls.
 uint32_t callableLevels(const TraversalSource& source, const SkeletonNeeds& needs);
 
 /// The copies that the skeleton runs, by the functions stageFunction() names.
 std::vector<StageCopy> stageCopies(const TraversalSource& source, const SkeletonNeeds& needs);
 std::string stageFunction(const StageCopy& copy);  ///< void f()
 
-/// A compute shader that runs the stages' functions, which are empty. Of what stages call it has glintTrace1, ...,
-/// glintCallable1, ... and glintReport, and the queries glint_query1, ... that glintTrace1, ... go on with.
+/// A compute shader that runs the stages' functions, which are empty, and so is glintBegin. Of what stages call it has
+/// glintAsk, glintCallable1, ... and glintReport.
 ShaderSource skeletonSource(const TraversalSource& source, const SkeletonNeeds& needs);
 
 }  // namespace glint::shader

@@ -135,10 +135,12 @@ uint32_t ValueWords::emit(Instructions& body, uint32_t opcode, uint32_t type,
     return id;
 }
 
-uint32_t ValueWords::place(Instructions& body, const WordArray& words, uint32_t first, uint32_t offset) const {
+uint32_t ValueWords::place(Instructions& body, const WordArray& words, uint32_t offset) const {
     const uint32_t uint_type = builder_.uintType();
-    uint32_t index = first ? first : builder_.constant(offset);
-    if (first && offset) index = emit(body, spv::OpIAdd, uint_type, std::array{first, builder_.constant(offset)});
+    offset += words.offset;
+    uint32_t index = words.first ? words.first : builder_.constant(offset);
+    if (words.first && offset)
+        index = emit(body, spv::OpIAdd, uint_type, std::array{words.first, builder_.constant(offset)});
     std::vector<uint32_t> chain = {words.variable};
     if (words.is_block) chain.push_back(builder_.constant(0));
     chain.push_back(index);
@@ -189,13 +191,12 @@ std::array<uint32_t, 2> ValueWords::toWords(Instructions& body, const Leaf& leaf
     return {emit(body, spv::OpBitcast, uint_type, std::array{wide}), 0};
 }
 
-void ValueWords::load(Instructions& body, uint32_t type, uint32_t pointer, const WordArray& words, uint32_t first,
-                      bool packed) const {
+void ValueWords::load(Instructions& body, uint32_t type, uint32_t pointer, const WordArray& words, bool packed) const {
     for (const Leaf& leaf : leaves(type, packed, "a variable")) {
         const uint32_t offset = packed ? leaf.offset : leaf.offset / word_bytes;
         std::array<uint32_t, 2> values = {};
         for (uint32_t i = 0; i < leaf.words; i++)
-            values[i] = emit(body, spv::OpLoad, builder_.uintType(), std::array{place(body, words, first, offset + i)});
+            values[i] = emit(body, spv::OpLoad, builder_.uintType(), std::array{place(body, words, offset + i)});
         const uint32_t value = fromWords(body, leaf, values);
         uint32_t target = pointer;
         if (!leaf.path.empty()) {
@@ -218,7 +219,7 @@ void ValueWords::store(Instructions& body, uint32_t type, uint32_t pointer, cons
         const uint32_t value = emit(body, spv::OpLoad, leaf.type, std::array{source});
         const std::array<uint32_t, 2> values = toWords(body, leaf, value);
         for (uint32_t i = 0; i < leaf.words; i++)
-            body.emplace_back(spv::OpStore, 0, 0, std::array{place(body, words, 0, leaf.offset + i), values[i]});
+            body.emplace_back(spv::OpStore, 0, 0, std::array{place(body, words, leaf.offset + i), values[i]});
     }
 }
 

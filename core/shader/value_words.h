@@ -11,6 +11,16 @@ struct WordArray {
     uint32_t variable = 0;
     uint32_t storage_class = 0;
     bool is_block = false;
+    /// Words are counted from here on: the id of a uint, 0 for the very first, and a number to be added.
+    uint32_t first = 0;
+    uint32_t offset = 0;
+
+    WordArray from(uint32_t index, uint32_t more = 0) const {
+        WordArray result = *this;
+        result.first = index;
+        result.offset = more;
+        return result;
+    }
 };
 
 /// Values as words. Packed, every component takes a word, or two if it has 64 bits, in the order of its type's members:
@@ -33,10 +43,8 @@ public:
     /// have no words, naming `what`.
     uint32_t count(uint32_t type, bool packed, std::string_view what) const;
 
-    /// Code that sets the variable behind `pointer` (Private) from the words from `first` on (an id of a uint; 0 for
-    /// the very first), and the reverse, packed.
-    void load(Instructions& body, uint32_t type, uint32_t pointer, const WordArray& words, uint32_t first,
-              bool packed) const;
+    /// Code that sets the variable behind `pointer` (Private) from words, and the reverse, packed.
+    void load(Instructions& body, uint32_t type, uint32_t pointer, const WordArray& words, bool packed) const;
     void store(Instructions& body, uint32_t type, uint32_t pointer, const WordArray& words) const;
 
 private:
@@ -57,7 +65,7 @@ private:
     uint32_t arrayLength(const Instruction& type) const;
     uint32_t memberValue(uint32_t type, uint32_t member, uint32_t decoration, uint32_t otherwise) const;
     uint32_t emit(Instructions& body, uint32_t opcode, uint32_t type, std::span<const uint32_t> operands) const;
-    uint32_t place(Instructions& body, const WordArray& words, uint32_t first, uint32_t offset) const;
+    uint32_t place(Instructions& body, const WordArray& words, uint32_t offset) const;
     uint32_t fromWords(Instructions& body, const Leaf& leaf, std::array<uint32_t, 2> values) const;
     std::array<uint32_t, 2> toWords(Instructions& body, const Leaf& leaf, uint32_t value) const;
 

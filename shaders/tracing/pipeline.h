@@ -1,11 +1,11 @@
 // What the stages of a ray-tracing pipeline share when they run as one compute shader: the frame, by which they hand on
-// what Vulkan hands on between shaders, and the records of the binding table. core/shader/traversal_skeleton.cpp writes
-// what calls the stages, one glintTrace function a level of recursion, after this; core/shader/traversal_joiner.cpp
-// copies the frame to the variables of a stage before it runs.
+// what Vulkan hands on between shaders, the search, and the records of the binding table. After this follows what
+// core/shader/traversal_skeleton.cpp writes, which calls the stages; core/shader/traversal_copier.cpp copies the frame to
+// the variables of a stage before it runs.
 //
-// Before it are defined: GLINT_JOIN_SET, the set of the two blocks; GLINT_PAYLOAD_WORDS, GLINT_CALLABLE_WORDS,
-// GLINT_ATTRIBUTE_WORDS and GLINT_PUSH_WORDS, lengths of at least 1, the attributes' of at least 2; and GLINT_USES_...
-// for what costs time to know.
+// Before it are defined: GLINT_JOIN_SET, the set of the two blocks; GLINT_DEPTH, the levels of recursion at which stages
+// may trace; GLINT_PAYLOAD_WORDS, GLINT_CALLABLE_WORDS, GLINT_ATTRIBUTE_WORDS, GLINT_PUSH_WORDS and GLINT_SAVED_WORDS,
+// lengths of at least 1, the attributes' of at least 2; and GLINT_USES_... for what costs time to know.
 #pragma once
 
 // Four tables (ray generation, miss, hit, callable): x the first word, y the words of a record, z how many there are.
@@ -42,6 +42,13 @@ int glint_custom_index;
 int glint_geometry;
 mat4x3 glint_to_world;
 mat4x3 glint_to_object;
+// Of the ray that is asked for.
+uint glint_ray_offset;
+uint glint_ray_stride;
+uint glint_ray_miss;
+float glint_ray_end;
+uint glint_structure;         // which of those that stages trace
+uvec2 glint_structure_place;  // its index in an array, or its address
 uint glint_record;  // first word of its record's data
 uint glint_payload[GLINT_PAYLOAD_WORDS];
 uint glint_callable[GLINT_CALLABLE_WORDS];
@@ -60,6 +67,23 @@ bool glint_reported;
 uint glint_reported_kind;
 uint glint_reported_attributes[GLINT_ATTRIBUTE_WORDS];
 
+// Which stage runs, and the piece of it that is next: stages that call traceRayEXT are cut into pieces, and return at the
+// call. What stages that nest have to find again is kept for each level of recursion but ray generation's, where there is
+// one of them only.
+const uint GLINT_NO_STAGE = 0xffffu;
+uint glint_stage;
+uint glint_piece;
+uint glint_level;
+bool glint_asks;
+uint glint_generation;  // stage and piece that wait, and below
+#if GLINT_DEPTH > 1
+// Of a single level the place does not depend on the level, which compilers are slow with.
+#define GLINT_FRAME (GLINT_DEPTH == 2 ? 0u : glint_level - 1u)
+uint glint_callers[GLINT_DEPTH - 1];
+uint glint_saved[(GLINT_DEPTH - 1) * GLINT_SAVED_WORDS];
+#endif
+rayQueryEXT glint_query;
+
 // Finds a record: sets glint_record and returns its group, GLINT_NO_RECORD if the table has no such record.
 uint glintFindRecord(const uint table, const uint index) {
     if (index >= glint_records.words[4u * table + 2u]) return GLINT_NO_RECORD;
@@ -68,71 +92,104 @@ uint glintFindRecord(const uint table, const uint index) {
     return glint_records.words[word];
 }
 
-// Puts what an intersection is like into the frame, all but its distance and kind; returns the group of its record.
-uint glintTell(rayQueryEXT query, const bool committed, const uint offset, const uint stride) {
-    // Which intersection is meant has to be a constant.
-    uint record;
-    if (committed) {
-        glint_primitive = rayQueryGetIntersectionPrimitiveIndexEXT(query, true);
-        glint_instance = rayQueryGetIntersectionInstanceIdEXT(query, true);
-        glint_geometry = rayQueryGetIntersectionGeometryIndexEXT(query, true);
-        record = rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(query, true);
+// Puts what an intersection is like into the frame, all but its distance and kind, and its group into `group`. A macro,
+// as which intersection is meant has to be a constant; parts are empty where no stage asks for them.
 #ifdef GLINT_USES_CUSTOM_INDEX
-        glint_custom_index = rayQueryGetIntersectionInstanceCustomIndexEXT(query, true);
+#define GLINT_TELL_CUSTOM_INDEX(committed) \
+    glint_custom_index = rayQueryGetIntersectionInstanceCustomIndexEXT(glint_query, committed);
+#else
+#define GLINT_TELL_CUSTOM_INDEX(committed)
 #endif
 #ifdef GLINT_USES_OBJECT_RAY
-        glint_object_origin = rayQueryGetIntersectionObjectRayOriginEXT(query, true);
-        glint_object_direction = rayQueryGetIntersectionObjectRayDirectionEXT(query, true);
+#define GLINT_TELL_OBJECT_RAY(committed)                                                      \
+    glint_object_origin = rayQueryGetIntersectionObjectRayOriginEXT(glint_query, committed); \
+    glint_object_direction = rayQueryGetIntersectionObjectRayDirectionEXT(glint_query, committed);
+#else
+#define GLINT_TELL_OBJECT_RAY(committed)
 #endif
 #ifdef GLINT_USES_TO_WORLD
-        glint_to_world = rayQueryGetIntersectionObjectToWorldEXT(query, true);
+#define GLINT_TELL_TO_WORLD(committed) \
+    glint_to_world = rayQueryGetIntersectionObjectToWorldEXT(glint_query, committed);
+#else
+#define GLINT_TELL_TO_WORLD(committed)
 #endif
 #ifdef GLINT_USES_TO_OBJECT
-        glint_to_object = rayQueryGetIntersectionWorldToObjectEXT(query, true);
+#define GLINT_TELL_TO_OBJECT(committed) \
+    glint_to_object = rayQueryGetIntersectionWorldToObjectEXT(glint_query, committed);
+#else
+#define GLINT_TELL_TO_OBJECT(committed)
 #endif
-    } else {
-        glint_primitive = rayQueryGetIntersectionPrimitiveIndexEXT(query, false);
-        glint_instance = rayQueryGetIntersectionInstanceIdEXT(query, false);
-        glint_geometry = rayQueryGetIntersectionGeometryIndexEXT(query, false);
-        record = rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(query, false);
-#ifdef GLINT_USES_CUSTOM_INDEX
-        glint_custom_index = rayQueryGetIntersectionInstanceCustomIndexEXT(query, false);
-#endif
-#ifdef GLINT_USES_OBJECT_RAY
-        glint_object_origin = rayQueryGetIntersectionObjectRayOriginEXT(query, false);
-        glint_object_direction = rayQueryGetIntersectionObjectRayDirectionEXT(query, false);
-#endif
-#ifdef GLINT_USES_TO_WORLD
-        glint_to_world = rayQueryGetIntersectionObjectToWorldEXT(query, false);
-#endif
-#ifdef GLINT_USES_TO_OBJECT
-        glint_to_object = rayQueryGetIntersectionWorldToObjectEXT(query, false);
-#endif
-    }
-    return glintFindRecord(GLINT_TABLE_HIT, record + uint(glint_geometry) * (stride & 15u) + (offset & 15u));
+#define GLINT_TELL(committed, group)                                                                                \
+    glint_primitive = rayQueryGetIntersectionPrimitiveIndexEXT(glint_query, committed);                             \
+    glint_instance = rayQueryGetIntersectionInstanceIdEXT(glint_query, committed);                                  \
+    glint_geometry = rayQueryGetIntersectionGeometryIndexEXT(glint_query, committed);                               \
+    GLINT_TELL_CUSTOM_INDEX(committed)                                                                              \
+    GLINT_TELL_OBJECT_RAY(committed)                                                                                \
+    GLINT_TELL_TO_WORLD(committed)                                                                                  \
+    GLINT_TELL_TO_OBJECT(committed)                                                                                 \
+    group = glintFindHit(rayQueryGetIntersectionInstanceShaderBindingTableRecordOffsetEXT(glint_query, committed))
+
+uint glintFindHit(const uint instance_offset) {
+    const uint index = instance_offset + uint(glint_geometry) * (glint_ray_stride & 15u) + (glint_ray_offset & 15u);
+    return glintFindRecord(GLINT_TABLE_HIT, index);
 }
 
-// What traceRayEXT begins with, its query apart.
-void glintBeginRay(const uint flags, const uint mask, const vec3 origin, const float t_min, const vec3 direction) {
+// What traceRayEXT begins with, but for the structure: the stage that calls it returns after this, and goes on when the
+// ray has come back.
+void glintAsk(const uint flags, const uint mask, const uint offset, const uint stride, const uint miss,
+              const vec3 origin, const float t_min, const vec3 direction, const float t_max) {
     glint_ray_flags = flags;
     glint_cull_mask = mask & 0xffu;
+    glint_ray_offset = offset;
+    glint_ray_stride = stride;
+    glint_ray_miss = miss & 0xffffu;
     glint_world_origin = origin;
-    glint_world_direction = direction;
     glint_t_min = t_min;
+    glint_world_direction = direction;
+    glint_ray_end = t_max;
+    glint_asks = true;
+}
+
+// The stage that has asked waits, and the one that its ray finds comes next.
+void glintCall() {
+    const uint caller = glint_piece << 16 | glint_stage;
+#if GLINT_DEPTH > 1
+    if (glint_level > 0u)
+        glint_callers[GLINT_FRAME] = caller;
+    else
+#endif
+        glint_generation = caller;
+    glint_level++;
+    glint_stage = GLINT_NO_STAGE;
+    glint_piece = 0u;
+}
+
+// Where no stage runs any more: the one that waits goes on.
+void glintReturn() {
+    glint_level--;
+    uint caller = glint_generation;
+#if GLINT_DEPTH > 1
+    if (glint_level > 0u) caller = glint_callers[GLINT_FRAME];
+#endif
+    glint_stage = caller & 0xffffu;
+    glint_piece = caller >> 16;
 }
 
 // The stages' calls are written by traversal_skeleton.cpp.
 void glintRunFirstHit(const uint group);
 void glintRunIntersection(const uint group);
+// Begins the query where the ray asks for it, with these flags.
+void glintBegin(const uint flags) {}
 
 // A triangle that is no opaque one: true if it is there.
-bool glintAskTriangle(rayQueryEXT query, const uint offset, const uint stride) {
-    const uint group = glintTell(query, false, offset, stride);
-    const vec2 barycentrics = rayQueryGetIntersectionBarycentricsEXT(query, false);
+bool glintAskTriangle() {
+    uint group;
+    GLINT_TELL(false, group);
+    const vec2 barycentrics = rayQueryGetIntersectionBarycentricsEXT(glint_query, false);
     glint_attributes[0] = floatBitsToUint(barycentrics.x);
     glint_attributes[1] = floatBitsToUint(barycentrics.y);
-    glint_t_max = rayQueryGetIntersectionTEXT(query, false);
-    glint_hit_kind = rayQueryGetIntersectionFrontFaceEXT(query, false) ? 0xfeu : 0xffu;
+    glint_t_max = rayQueryGetIntersectionTEXT(glint_query, false);
+    glint_hit_kind = rayQueryGetIntersectionFrontFaceEXT(glint_query, false) ? 0xfeu : 0xffu;
     glint_ignored = false;
     glint_ended = false;
     glint_unwind = false;
@@ -142,9 +199,9 @@ bool glintAskTriangle(rayQueryEXT query, const uint offset, const uint stride) {
 
 // A box whose content ends before `limit`, as far as is known: true if its intersection shader has reported a hit that
 // is taken; glint_t_max is its distance.
-bool glintAskBox(rayQueryEXT query, const float limit, const uint offset, const uint stride) {
-    glint_group = glintTell(query, false, offset, stride);
-    glint_opaque = rayQueryGetIntersectionCandidateAABBOpaqueEXT(query);
+bool glintAskBox(const float limit) {
+    GLINT_TELL(false, glint_group);
+    glint_opaque = rayQueryGetIntersectionCandidateAABBOpaqueEXT(glint_query);
     glint_t_max = limit;
     glint_hit_kind = 0u;
     glint_reported = false;
@@ -177,51 +234,66 @@ bool glintReport(const float t, const uint kind) {
     return true;
 }
 
-// A ray's search, by the query that is at its beginning. Afterwards the frame tells the closest hit; returns the group
-// of its record, or GLINT_NO_RECORD. `hits` says whether there is one at all.
-uint glintSearch(rayQueryEXT query, const float t_max, const uint offset, const uint stride, out bool hits) {
+// A ray's search. Afterwards the frame tells the closest hit; returns the group of its record, or GLINT_NO_RECORD. `hits`
+// says whether there is one at all.
+uint glintSearch(out bool hits) {
+    // Flags of pipelines alone are none of a query's.
+    uint flags = glint_ray_flags & ~gl_RayFlagsSkipClosestHitShaderEXT;
+#if !defined(GLINT_USES_FIRST_HIT) && !defined(GLINT_USES_INTERSECTION)
+    // There is nobody to ask about a triangle, so that it may as well be opaque, unless it is culled for being that.
+    if ((flags & (gl_RayFlagsCullOpaqueEXT | gl_RayFlagsCullNoOpaqueEXT)) == 0u)
+        flags = (flags & ~gl_RayFlagsNoOpaqueEXT) | gl_RayFlagsOpaqueEXT;
+#endif
+    glintBegin(flags);
+#ifdef GLINT_USES_INTERSECTION
     uint box_kind = 0u;
     uint box_attributes[GLINT_ATTRIBUTE_WORDS];
-    while (rayQueryProceedEXT(query)) {
-        if (rayQueryGetIntersectionTypeEXT(query, false) == gl_RayQueryCandidateIntersectionTriangleEXT) {
+#endif
+    while (rayQueryProceedEXT(glint_query)) {
+        if (rayQueryGetIntersectionTypeEXT(glint_query, false) == gl_RayQueryCandidateIntersectionTriangleEXT) {
 #ifdef GLINT_USES_FIRST_HIT
-            if (glintAskTriangle(query, offset, stride)) {
-                rayQueryConfirmIntersectionEXT(query);
-                if (glint_ended) rayQueryTerminateEXT(query);
+            if (glintAskTriangle()) {
+                rayQueryConfirmIntersectionEXT(glint_query);
+                if (glint_ended) rayQueryTerminateEXT(glint_query);
             }
 #else
-            rayQueryConfirmIntersectionEXT(query);
+            rayQueryConfirmIntersectionEXT(glint_query);
 #endif
         }
 #ifdef GLINT_USES_INTERSECTION
         else {
-            float limit = t_max;
-            if (rayQueryGetIntersectionTypeEXT(query, true) != gl_RayQueryCommittedIntersectionNoneEXT)
-                limit = rayQueryGetIntersectionTEXT(query, true);
-            if (glintAskBox(query, limit, offset, stride)) {
+            float limit = glint_ray_end;
+            if (rayQueryGetIntersectionTypeEXT(glint_query, true) != gl_RayQueryCommittedIntersectionNoneEXT)
+                limit = rayQueryGetIntersectionTEXT(glint_query, true);
+            if (glintAskBox(limit)) {
                 box_kind = glint_reported_kind;
                 for (int i = 0; i < GLINT_ATTRIBUTE_WORDS; i++) box_attributes[i] = glint_reported_attributes[i];
-                rayQueryGenerateIntersectionEXT(query, glint_t_max);
-                if (glint_ended) rayQueryTerminateEXT(query);
+                rayQueryGenerateIntersectionEXT(glint_query, glint_t_max);
+                if (glint_ended) rayQueryTerminateEXT(glint_query);
             }
         }
 #endif
     }
-    const uint type = rayQueryGetIntersectionTypeEXT(query, true);
+    const uint type = rayQueryGetIntersectionTypeEXT(glint_query, true);
     hits = type != gl_RayQueryCommittedIntersectionNoneEXT;
     if (!hits) {
-        glint_t_max = t_max;
+        glint_t_max = glint_ray_end;
         return GLINT_NO_RECORD;
     }
-    glint_t_max = rayQueryGetIntersectionTEXT(query, true);
-    if (type == gl_RayQueryCommittedIntersectionTriangleEXT) {
-        const vec2 barycentrics = rayQueryGetIntersectionBarycentricsEXT(query, true);
-        glint_attributes[0] = floatBitsToUint(barycentrics.x);
-        glint_attributes[1] = floatBitsToUint(barycentrics.y);
-        glint_hit_kind = rayQueryGetIntersectionFrontFaceEXT(query, true) ? 0xfeu : 0xffu;
-    } else {
+    glint_t_max = rayQueryGetIntersectionTEXT(glint_query, true);
+#ifdef GLINT_USES_INTERSECTION
+    if (type == gl_RayQueryCommittedIntersectionGeneratedEXT) {
         for (int i = 0; i < GLINT_ATTRIBUTE_WORDS; i++) glint_attributes[i] = box_attributes[i];
         glint_hit_kind = box_kind;
+    } else
+#endif
+    {
+        const vec2 barycentrics = rayQueryGetIntersectionBarycentricsEXT(glint_query, true);
+        glint_attributes[0] = floatBitsToUint(barycentrics.x);
+        glint_attributes[1] = floatBitsToUint(barycentrics.y);
+        glint_hit_kind = rayQueryGetIntersectionFrontFaceEXT(glint_query, true) ? 0xfeu : 0xffu;
     }
-    return glintTell(query, true, offset, stride);
+    uint group;
+    GLINT_TELL(true, group);
+    return group;
 }

@@ -122,13 +122,14 @@ std::string incoming(std::string_view declarations, std::string_view body) {
 
 TEST_F(TraversalJoinText, RewritesForTheSoftwareEngine) {
     for (const bool optimized : {false, true}) {
-        // A query a level: the trace of a second level's closest hit is beyond the depth.
         const Expected<Words> joined =
             join({{ShaderStage::RayGen, generation}, {ShaderStage::Closest, closest}}, 2, optimized);
         ASSERT_THAT(joined, IsOk());
         EXPECT_EQ(countInstructions(*joined, spv::OpCapability, spv::CapabilityRayTracingKHR, 1), 0u);
         EXPECT_EQ(countInstructions(*joined, spv::OpTraceRayKHR), 0u);
-        EXPECT_EQ(countInstructions(*joined, spv::OpRayQueryInitializeKHR), 2u);
+        // However many traces there are, and however deep: one search.
+        EXPECT_EQ(countInstructions(*joined, spv::OpRayQueryInitializeKHR), 1u);
+        EXPECT_EQ(countInstructions(*joined, spv::OpRayQueryProceedKHR), 1u);
 
         ShaderSource source = binary(*joined);
         source.tracing.library = "glint/tracing/query.h";
@@ -184,9 +185,20 @@ TEST_F(TraversalJoinText, WhatCannotBeCarriedOverIsNamed) {
     EXPECT_EQ(error.id(), "shader.traversal_size");
     EXPECT_NE(error.message().find("1024 words"), std::string::npos) << error.text();
 
-    error = refusal({rays, {ShaderStage::Closest, closest}}, 1000);
+    const std::string keeping =
+        "layout(binding = 0) uniform accelerationStructureEXT scene;\n"
+        "layout(location = 0) rayPayloadEXT vec4 inner;\nlayout(location = 1) rayPayloadInEXT vec4 payload;\n"
+        "float kept[300];\n"
+        "void main() {\n"
+        "    for (int i = 0; i < 300; i++) kept[i] = payload.x * float(i);\n"
+        "    traceRayEXT(scene, 0u, 0xff, 0, 1, 0, vec3(0.0), 0.0, vec3(0.0, 1.0, 0.0), 100.0, 0);\n"
+        "    payload = vec4(kept[int(inner.x)]);\n}\n";
+    error = refusal({rays, {ShaderStage::Closest, keeping}}, 31);
     EXPECT_EQ(error.id(), "shader.traversal_size");
-    EXPECT_NE(error.message().find("recursion depth 1000"), std::string::npos) << error.text();
+    EXPECT_EQ(error.code(), ErrorCode::Unsupported);
+    EXPECT_NE(error.message().find("recursion depth 31"), std::string::npos) << error.text();
+    EXPECT_NE(error.message().find("8192"), std::string::npos) << error.text();
+    EXPECT_THAT(join({rays, {ShaderStage::Closest, keeping}}, 20), IsOk());
 }
 
 TEST_F(TraversalJoinText, KindsOfPayloadsAndConstants) {

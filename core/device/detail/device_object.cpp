@@ -14,8 +14,8 @@ namespace glint::detail {
 
 namespace {
 
-/// How deep rays of a joined traversal nest: its search is inlined at every call of every level.
-constexpr uint32_t joined_recursion = 4;
+/// How deep rays of a joined traversal nest: as deep as lavapipe's own.
+constexpr uint32_t joined_recursion = 31;
 
 /// What a program asks for, else what the environment does.
 Expected<TracingEngine> askedEngine(TracingEngine engine) {

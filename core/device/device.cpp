@@ -135,14 +135,14 @@ Traversal Device::createTraversal(std::string_view name, Where where) {
     Traversal traversal = make<Traversal, detail::TraversalObject>(*this, name, where);
     if (traversal.state() != ObjectState::Building) return traversal;
     DeviceObject& object = *opened(*this);
-    if (object.joinsTraversals()) return traversal;
-    if (object.features().rayTracing)
-        object.buildForTraversals();
-    else
+    if (object.features().rayTracing) {
+        if (!object.joinsTraversals()) object.buildForTraversals();
+    } else {
         traversal.object()->fail(makeError(where, ErrorCode::Unsupported, "device.unsupported",
                                            "{}: {} {} the feature {}", traversal.object()->label(), getInfo().name,
                                            getInfo().features & FeatureRayTracing ? "was opened without" : "lacks",
                                            toString(FeatureRayTracing)));
+    }
     return traversal;
 }
 

@@ -10,7 +10,7 @@ namespace glint {
 enum Feature : uint64_t {
     FeatureComputeTracing = 1ull << 0,   ///< ray queries in compute shaders
     FeatureFragmentTracing = 1ull << 1,  ///< ray queries in vertex and fragment shaders
-    FeatureRayTracing = 1ull << 2,       ///< ray-tracing pipelines
+    FeatureRayTracing = 1ull << 2,       ///< ray-tracing pipelines: Traversal
     FeatureMeshShader = 1ull << 3,       ///< task and mesh shaders
     FeatureBufferAddress = 1ull << 4,    ///< Buffer::getAddress and buffer references in shaders
     FeatureTextureTable = 1ull << 5,     ///< TextureTable: arrays of textures of unknown length
@@ -39,9 +39,10 @@ enum Feature : uint64_t {
     FeatureCount = 28,
 };
 
-/// Who answers ray queries: the driver, or Glint's own hierarchies and traversal in the shader (docs/tracing.md).
+/// Who answers ray queries and runs ray-tracing pipelines: the driver, or Glint's own hierarchies, traversal in the
+/// shader and pipelines joined into kernels (docs/tracing.md).
 enum class TracingEngine : uint8_t {
-    Auto,  ///< the driver where the device is no CPU and offers ray queries, else software
+    Auto,  ///< for either, the driver where the device is no CPU and offers what was asked for, else software
     Driver,
     Software,
 };
@@ -78,8 +79,10 @@ struct Features {
 
     /// Who provides computeTracing and fragmentTracing; never Auto on an open device.
     TracingEngine tracingEngine = TracingEngine::Driver;
+    /// Who provides rayTracing; with Software, computeTracing is there, too.
+    TracingEngine traversalEngine = TracingEngine::Driver;
 
-    uint32_t recursionDepth = 0;    ///< of ray-tracing pipelines
+    uint32_t recursionDepth = 0;    ///< of ray-tracing pipelines; this and the next four are 0 without rayTracing
     uint64_t maxRays = 0;           ///< of one dispatch of a Traversal
     uint32_t maxRecordSize = 0;     ///< bytes of data of a record of a Traversal
     uint32_t maxAttributeSize = 0;  ///< bytes of hit attributes
@@ -140,8 +143,9 @@ struct DeviceInfo {
     uint32_t device_id = 0;
     bool cpu = false;          ///< runs on the CPU
     FeatureMask features = 0;  ///< all that the adapter offers
-    /// Of an open device: which engine answers ray queries, and why.
+    /// Of an open device: which engine answers ray queries, and which runs ray-tracing pipelines; and why.
     std::string tracing;
+    std::string traversal;
 };
 
 }  // namespace glint

@@ -312,6 +312,8 @@ Expected<BindingLayout> ProgramObject::mergeStages(const Stages& stages, Where w
         reflections.push_back(&shader->compiled.reflection);
         if (Error error = checkFeatures(*reflections.back(), where)) return unexpected(error);
     }
+    const Reflection joined = joinedDeclarations(stages);
+    if (!joined_resources.empty()) reflections.push_back(&joined);
     Expected<BindingLayout> merged = mergeLayouts(reflections);
     if (!merged) return unexpected(merged.error().at(where).named(name()));
     for (const ShaderResource& resource : merged->resources)
@@ -325,12 +327,29 @@ Expected<BindingLayout> ProgramObject::mergeStages(const Stages& stages, Where w
     return merged;
 }
 
+Reflection ProgramObject::joinedDeclarations(const Stages& stages) const {
+    Reflection result;
+    result.stage = ShaderStage::Compute;
+    result.resources = joined_resources;
+    for (ShaderResource& resource : result.resources) {
+        resource.stages = stageBit(ShaderStage::Compute);
+        if (resource.kind != SlotKind::Tracing) continue;
+        if (device()->heap()) resource.descriptor = SlotKind::Uniform;
+        for (const Ref<ShaderObject>& shader : stages.shaders)
+            for (const ShaderResource& other : shader->compiled.reflection.resources)
+                if (other.set == resource.set && other.binding == resource.binding)
+                    resource.descriptor = other.descriptor;
+    }
+    return result;
+}
+
 Error ProgramObject::checkFeatures(const Reflection& stage, Where where) const {
     FeatureMask needed = 0;
     if (stage.stage >= ShaderStage::RayGen) {
         needed |= FeatureRayTracing;
-        // The software engine rewrites no stage of ray-tracing pipelines.
-        if (stage.uses_ray_query && !device()->backend->features().has(FeatureComputeTracing))
+        // The software engine rewrites no stage of the driver's pipelines.
+        if (stage.uses_ray_query && !device()->joinsTraversals() &&
+            !device()->backend->features().has(FeatureComputeTracing))
             return problem(where, ErrorCode::Unsupported, "program.feature",
                            fmt::format("the {} shader has ray queries, which the driver of {} does not offer",
                                        glint::toString(stage.stage), device()->info().name));

@@ -2,11 +2,8 @@
 
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
-#include <glint/device/detail/recorder_core.h>
-#include <glint/shader/traversal_joiner.h>
 
 #include <algorithm>
-#include <cstring>
 
 namespace glint {
 
@@ -140,84 +137,13 @@ Status TraversalObject::check(const Stages& stages, Where where) const {
     if (groups[static_cast<size_t>(RayTable::Generation)].empty())
         return problem(where, ErrorCode::InvalidArgument, "program.stage", "there is no ray-generation shader");
     if (const uint32_t limit = device()->features().recursionDepth; recursion_depth > limit)
-        return problem(where, ErrorCode::OutOfRange, "traversal.recursion",
+        return problem(where, ErrorCode::Unsupported, "traversal.recursion",
                        fmt::format("recursion depth {}, the device's limit is {}", recursion_depth, limit));
+    if (constexpr uint32_t limit = Traversal::max_callable_depth; callable_depth > limit)
+        return problem(where, ErrorCode::Unsupported, "traversal.callable_depth",
+                       fmt::format("callable depth {}, the limit is {}", callable_depth, limit));
     if (Error error = checkRecords(stages, where)) return error;
     if (Error error = checkVariables(stages, where)) return error;
-    return {};
-}
-
-/// The table as shaders/tracing/pipeline.h reads it.
-std::vector<uint32_t> TraversalObject::recordWords() const {
-    std::vector<uint32_t> words(4 * ray_tables);
-    for (size_t t = 0; t < ray_tables; t++) {
-        const uint32_t count = countRecords(static_cast<RayTable>(t));
-        size_t data = 0;
-        for (const Record& record : records[t]) data = std::max(data, record.data.size());
-        const size_t stride = 1 + (data + 3) / 4;
-        words[4 * t] = static_cast<uint32_t>(words.size());
-        words[4 * t + 1] = static_cast<uint32_t>(stride);
-        words[4 * t + 2] = count;
-        for (uint32_t i = 0; i < count; i++) {
-            const size_t place = words.size();
-            words.resize(place + stride);
-            words[place] = records[t].empty() ? i : records[t][i].group;
-            if (!records[t].empty() && !records[t][i].data.empty())
-                std::memcpy(&words[place + 1], records[t][i].data.data(), records[t][i].data.size());
-        }
-    }
-    return words;
-}
-
-Status TraversalObject::join(const Stages& stages, Where where) {
-    static_assert(static_cast<int>(RayTable::Generation) == shader::TraversalSource::Generation &&
-                  static_cast<int>(RayTable::Miss) == shader::TraversalSource::Miss &&
-                  static_cast<int>(RayTable::Hit) == shader::TraversalSource::Hit &&
-                  static_cast<int>(RayTable::Callable) == shader::TraversalSource::Callable);
-    shader::TraversalSource source;
-    source.name = name();
-    source.recursion_depth = recursion_depth;
-    source.set = layout.set_count;
-    source.binding = 0;
-    for (size_t i = 0; i < stages.shaders.size(); i++) {
-        const StageDesc stage = stages.desc(i);
-        auto& made = source.stages.emplace_back();
-        made.stage = stage.stage;
-        made.name = stages.shaders[i]->source.name;
-        made.words = stage.words;
-        made.entry = stage.entry;
-        for (const SpecializationValue& constant : stage.constants)
-            made.constants.emplace_back(constant.id, constant.value);
-    }
-    for (size_t t = 0; t < ray_tables; t++)
-        for (const Group& group : groups[t])
-            source.groups[t].push_back({group.general, group.closest, group.first_hit, group.intersection});
-    Expected<std::vector<uint32_t>> words = shader::joinTraversal(source);
-    if (!words) return words.error().at(where).named(name());
-
-    const Shader shader = Shader::createSPIRV(Shader::TypeCompute, *words, name(), where);
-    if (!shader) return shader.error();
-    auto kernel = Ref<KernelObject>::adopt(new KernelObject(device()));
-    kernel->setName(name());
-    kernel->shaders.emplace_back(static_cast<ShaderObject*>(shader.object()));
-    if (Status status = kernel->create(where); !status) return status;
-    joined = std::move(kernel);
-    if (joined_records) return {};
-
-    const std::vector<uint32_t> table = recordWords();
-    NativeBufferDesc desc;
-    desc.size = table.size() * sizeof(uint32_t);
-    desc.flags = Buffer::FlagStorage;
-    desc.name = "records";
-    Expected<Ref<BufferObject>> buffer = device()->createInternal(desc, where);
-    if (!buffer) return buffer.error();
-    Expected<Ref<BufferObject>> staging = device()->createStaging(desc.size, false, where);
-    if (!staging) return staging.error();
-    std::memcpy((*staging)->nativeBuffer()->mapped, table.data(), desc.size);
-    Status copied = device()->playNow(
-        "records", where, [&](RecorderCore& core) { core.copyBuffer(**buffer, 0, **staging, 0, desc.size); });
-    if (!copied) return copied;
-    joined_records = std::move(*buffer);
     return {};
 }
 
@@ -238,6 +164,7 @@ Expected<std::unique_ptr<Native>> TraversalObject::createNative(const Stages& st
     }
     desc.layout = &layout;
     desc.recursion_depth = recursion_depth;
+    desc.callable_depth = callable_depth;
     desc.name = name();
     auto made = device()->backend->createTraversal(desc);
     if (!made) return unexpected(made.error().at(where).named(name()));
@@ -289,6 +216,11 @@ Traversal& Traversal::setRecursionDepth(uint32_t depth, Where where) {
     return *this;
 }
 
+Traversal& Traversal::setCallableDepth(uint32_t depth, Where where) {
+    if (TraversalObject* traversal = configurable(object_, where)) traversal->callable_depth = depth;
+    return *this;
+}
+
 uint32_t Traversal::addHitRecord(uint32_t group, const void* data, uint64_t size, Where where) {
     return addRecord(object_, RayTable::Hit, group, data, size, where);
 }
@@ -310,6 +242,9 @@ uint32_t Traversal::getHitGroups() const {
 }
 uint32_t Traversal::getRecursionDepth() const {
     return object_ ? static_cast<const TraversalObject*>(object_)->recursion_depth : 0;
+}
+uint32_t Traversal::getCallableDepth() const {
+    return object_ ? static_cast<const TraversalObject*>(object_)->callable_depth : 0;
 }
 
 }  // namespace glint

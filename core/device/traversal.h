@@ -45,6 +45,10 @@ public:
     /// How deep traceRayEXT may nest: 1 traces from ray-generation shaders alone. More than Features::recursionDepth
     /// fails create() with "traversal.recursion"; deeper nesting in the shaders is undefined.
     Traversal& setRecursionDepth(uint32_t depth, Where where = Where::current());
+    /// How deep executeCallableEXT may nest, 2 unless it is said: 1 calls callable shaders that call none. More than
+    /// max_callable_depth fails create() with "traversal.callable_depth"; deeper nesting in the shaders is undefined.
+    Traversal& setCallableDepth(uint32_t depth, Where where = Where::current());
+    static constexpr uint32_t max_callable_depth = 31;
 
     /// Adds a record to a table: the group counts as above, `data` is what its shaders read in their shaderRecordEXT
     /// block, copied. Returns the record's index in its table. create() checks groups ("traversal.record_group") and
@@ -82,6 +86,7 @@ public:
     uint32_t getMissRecords() const;
     uint32_t getCallableRecords() const;
     uint32_t getRecursionDepth() const;
+    uint32_t getCallableDepth() const;
 
 private:
     template <class Data>

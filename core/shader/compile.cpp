@@ -130,17 +130,50 @@ void dropSourceExtensions(std::vector<uint32_t>& words) {
     words.resize(out);
 }
 
+/// #line directives with the names of files in the place of their numbers, which do not reach SPIR-V.
+std::string nameFiles(const Preprocessed& text) {
+    constexpr std::string_view directive = "#line ";
+    std::string result;
+    for (size_t begin = 0; begin < text.text.size();) {
+        const size_t end = std::min(text.text.find('\n', begin), text.text.size() - 1) + 1;
+        std::string_view line = std::string_view(text.text).substr(begin, end - begin);
+        begin = end;
+        uint32_t number = 0, file = 0;
+        const char* const last = line.data() + line.size();
+        const bool starts = line.starts_with(directive);
+        const auto [space, no_number] =
+            std::from_chars(line.data() + (starts ? directive.size() : line.size()), last, number);
+        const bool has_file = no_number == std::errc() && space != last && *space == ' ' &&
+                              std::from_chars(space + 1, last, file).ec == std::errc() && file < text.sources.size();
+        if (has_file && text.sources[file].find_first_of("\"\\\n") == std::string::npos)
+            fmt::format_to(std::back_inserter(result), "#line {} \"{}\"\n", number, text.sources[file]);
+        else
+            result += line;
+    }
+    return result;
+}
+
 Expected<std::vector<uint32_t>> translate(const ShaderSource& source, const Preprocessed& text,
-                                          glslang::EShTargetLanguageVersion target, EShMessages rules) {
+                                          glslang::EShTargetLanguageVersion target, EShMessages rules,
+                                          bool with_lines = false) {
     // Never finalised: other threads may be compiling while static objects are destroyed.
     static std::once_flag initialized;
     std::call_once(initialized, [] { glslang::InitializeProcess(); });
 
     const EShLanguage language = languageOf(source.stage);
-    const char* string = text.text.data();
-    const int length = static_cast<int>(text.text.size());
+    const std::string named = with_lines ? nameFiles(text) : std::string();
+    const std::string& code = with_lines ? named : text.text;
+    const char* string = code.data();
+    const int length = static_cast<int>(code.size());
+    const std::string file_name = displayName(source);
+    const char* const file = file_name.c_str();
     glslang::TShader shader(language);
-    shader.setStringsWithLengths(&string, &length, 1);
+    if (with_lines) {
+        shader.setStringsWithLengthsAndNames(&string, &length, &file, 1);
+        shader.setPreamble("#extension GL_GOOGLE_cpp_style_line_directive : enable\n");
+    } else {
+        shader.setStringsWithLengths(&string, &length, 1);
+    }
     shader.setEnvInput(glslang::EShSourceGlsl, language, glslang::EShClientVulkan, 100);
     shader.setEnvClient(glslang::EShClientVulkan, glslang::EShTargetVulkan_1_3);
     shader.setEnvTarget(glslang::EShTargetSpv, target);
@@ -164,6 +197,7 @@ Expected<std::vector<uint32_t>> translate(const ShaderSource& source, const Prep
     spv::SpvBuildLogger logger;
     glslang::SpvOptions options;
     options.disableOptimizer = true;
+    options.generateDebugInfo = with_lines;
     glslang::GlslangToSpv(*program.getIntermediate(language), words, &logger, &options);
     if (words.size() < 5)
         return unexpected(sourceError(source, ErrorCode::ShaderCompile, "shader.compile",
@@ -178,6 +212,11 @@ Expected<std::vector<uint32_t>> translate(const ShaderSource& source, const Prep
 Expected<std::vector<uint32_t>> compile(const ShaderSource& source, const Preprocessed& text) {
     return translate(source, text, glslang::EShTargetSpv_1_6,
                      static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules));
+}
+
+Expected<std::vector<uint32_t>> compileWithLines(const ShaderSource& source, const Preprocessed& text) {
+    return translate(source, text, glslang::EShTargetSpv_1_6,
+                     static_cast<EShMessages>(EShMsgSpvRules | EShMsgVulkanRules), true);
 }
 
 Expected<std::vector<uint32_t>> compileLibrary(const ShaderSource& source, const Preprocessed& text, uint32_t version) {

@@ -66,8 +66,8 @@ Expected<std::vector<uint32_t>> compileLibrary(const ShaderSource& source, const
 /// The text of the library that a source is to be rewritten for, as for one query.
 Expected<Preprocessed> preprocessLibrary(const TracingRewrite& tracing);
 
-/// SPIR-V's number of a stage.
-uint32_t executionModel(ShaderStage stage);
+/// As compile(), with the line of every instruction: for messages about what comes later.
+Expected<std::vector<uint32_t>> compileWithLines(const ShaderSource& source, const Preprocessed& text);
 
 /// `validate` without the check of the stage; what is wrong with the words, or nothing. `instruction` is the number of
 /// the instruction that it concerns, counted from 1, 0 if it is none.

@@ -66,7 +66,7 @@ namespace glint::vulkan {
 
 #define GLINT_VULKAN_TRAVERSAL_FUNCTIONS(X) \
     X(CreateRayTracingPipelinesKHR) X(GetRayTracingShaderGroupHandlesKHR) X(CmdTraceRaysKHR) \
-    X(CmdTraceRaysIndirectKHR)
+    X(CmdTraceRaysIndirectKHR) X(GetRayTracingShaderGroupStackSizeKHR) X(CmdSetRayTracingPipelineStackSizeKHR)
 
 #define GLINT_VULKAN_MESH_FUNCTIONS(X) \
     X(CmdDrawMeshTasksEXT) X(CmdDrawMeshTasksIndirectEXT) X(CmdDrawMeshTasksIndirectCountEXT)

@@ -208,6 +208,7 @@ void Player::play(const TraceRaysCommand& command) {
     const auto& traversal = native<VulkanTraversal>(command.traversal);
     bindPipeline(rays_, traversal.handle());
     if (!bind(rays_, traversal.layout(), command.bindings)) return;
+    if (traversal.stackSize()) vk_.CmdSetRayTracingPipelineStackSizeKHR(commands_, traversal.stackSize());
     const VkStridedDeviceAddressRegionKHR generation = traversal.generation(command.generation);
     vk_.CmdTraceRaysKHR(commands_, &generation, &traversal.table(RayTable::Miss), &traversal.table(RayTable::Hit),
                         &traversal.table(RayTable::Callable), command.rays[0], command.rays[1], command.rays[2]);
@@ -217,6 +218,7 @@ void Player::play(const TraceRaysIndirectCommand& command) {
     const auto& traversal = native<VulkanTraversal>(command.traversal);
     bindPipeline(rays_, traversal.handle());
     if (!bind(rays_, traversal.layout(), command.bindings)) return;
+    if (traversal.stackSize()) vk_.CmdSetRayTracingPipelineStackSizeKHR(commands_, traversal.stackSize());
     const VkStridedDeviceAddressRegionKHR generation = traversal.generation(command.generation);
     vk_.CmdTraceRaysIndirectKHR(commands_, &generation, &traversal.table(RayTable::Miss),
                                 &traversal.table(RayTable::Hit), &traversal.table(RayTable::Callable),

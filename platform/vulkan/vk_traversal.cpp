@@ -38,6 +38,12 @@ VkRayTracingShaderGroupCreateInfoKHR nativeGroup(const TraversalDesc::Group& gro
     return native;
 }
 
+/// Callables that nest deeper than a pipeline's default stack is made for.
+bool needsStack(const TraversalDesc& desc) {
+    constexpr uint32_t default_depth = 2;
+    return desc.callable_depth > default_depth && !desc.tables[static_cast<size_t>(RayTable::Callable)].empty();
+}
+
 bool isEmpty(const TraversalDesc::Group& group) {
     return (group.general & group.closest & group.first_hit & group.intersection) == detail::none;
 }
@@ -75,11 +81,45 @@ Status VulkanTraversal::createPipeline(const TraversalDesc& desc) {
     info.pGroups = groups.data();
     info.maxPipelineRayRecursionDepth = desc.recursion_depth;
     info.layout = layout_->handle;
+    constexpr VkDynamicState stack = VK_DYNAMIC_STATE_RAY_TRACING_PIPELINE_STACK_SIZE_KHR;
+    VkPipelineDynamicStateCreateInfo dynamic = {VK_STRUCTURE_TYPE_PIPELINE_DYNAMIC_STATE_CREATE_INFO};
+    dynamic.dynamicStateCount = 1;
+    dynamic.pDynamicStates = &stack;
+    if (needsStack(desc)) info.pDynamicState = &dynamic;
     const VkResult result = device_.vk.CreateRayTracingPipelinesKHR(device_.handle, VK_NULL_HANDLE, VK_NULL_HANDLE, 1,
                                                                     &info, nullptr, &handle_);
     if (result != VK_SUCCESS) return resultError("vkCreateRayTracingPipelinesKHR", result);
     device_.memory.objects_created++;
+    if (needsStack(desc)) stack_size_ = sumStack(desc);
     return {};
+}
+
+/// The default of Vulkan 1.3, 14.1 "Ray Tracing Pipeline Stack", but that callables nest deeper than twice.
+uint32_t VulkanTraversal::sumStack(const TraversalDesc& desc) const {
+    // For the shaders of a kind the largest one counts; a group without one has 0.
+    const auto largest = [&](RayTable table, uint32_t TraversalDesc::Group::*member, VkShaderGroupShaderKHR kind) {
+        VkDeviceSize size = 0;
+        for (const TraversalDesc::Record& record : desc.tables[static_cast<size_t>(table)]) {
+            if (desc.groups[record.group].*member == detail::none) continue;
+            size = std::max(
+                size, device_.vk.GetRayTracingShaderGroupStackSizeKHR(device_.handle, handle_, record.group, kind));
+        }
+        return size;
+    };
+    using Group = TraversalDesc::Group;
+    const auto general = VK_SHADER_GROUP_SHADER_GENERAL_KHR;
+    const VkDeviceSize generation = largest(RayTable::Generation, &Group::general, general);
+    const VkDeviceSize miss = largest(RayTable::Miss, &Group::general, general);
+    const VkDeviceSize callable = largest(RayTable::Callable, &Group::general, general);
+    const VkDeviceSize closest = largest(RayTable::Hit, &Group::closest, VK_SHADER_GROUP_SHADER_CLOSEST_HIT_KHR);
+    const VkDeviceSize any = largest(RayTable::Hit, &Group::first_hit, VK_SHADER_GROUP_SHADER_ANY_HIT_KHR);
+    const VkDeviceSize intersection =
+        largest(RayTable::Hit, &Group::intersection, VK_SHADER_GROUP_SHADER_INTERSECTION_KHR);
+    const uint64_t depth = desc.recursion_depth;
+    const uint64_t sum = generation + std::min<uint64_t>(1, depth) * std::max({closest, miss, intersection + any}) +
+                         (depth > 1 ? depth - 1 : 0) * std::max(closest, miss) + desc.callable_depth * callable;
+    // A stack of no bytes is one that shaders do not need.
+    return static_cast<uint32_t>(std::clamp<uint64_t>(sum, 1, UINT32_MAX));
 }
 
 Status VulkanTraversal::writeTables(const TraversalDesc& desc) {

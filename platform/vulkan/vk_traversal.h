@@ -24,16 +24,20 @@ public:
         return regions_[static_cast<size_t>(table)];
     }
     VkStridedDeviceAddressRegionKHR generation(uint32_t index) const;
+    /// Bytes that dispatches have to set for the pipeline's stack; 0 where its default is enough.
+    uint32_t stackSize() const { return stack_size_; }
 
 private:
     explicit VulkanTraversal(VulkanDevice& device) : device_(device) {}
     Status createPipeline(const detail::TraversalDesc& desc);
     Status writeTables(const detail::TraversalDesc& desc);
+    uint32_t sumStack(const detail::TraversalDesc& desc) const;
 
     VulkanDevice& device_;
     PipelineLayout* layout_ = nullptr;
     VkPipeline handle_ = VK_NULL_HANDLE;
     RawBuffer tables_;
+    uint32_t stack_size_ = 0;
     std::array<VkStridedDeviceAddressRegionKHR, detail::ray_tables> regions_ = {};
 };
 

@@ -32,10 +32,10 @@ TEST_P(DeviceTests, SaysWhatItIs) {
 
 TEST_P(DeviceTests, FeaturesAreThoseAskedFor) {
     const Features& features = device.getFeatures();
-    // Ray queries in software need nothing of the adapter's.
-    const FeatureMask own = features.tracingEngine == TracingEngine::Software
-                                ? FeatureComputeTracing | FeatureFragmentTracing
-                                : FeatureNone;
+    // Ray queries and ray-tracing pipelines in software need nothing of the adapter's.
+    FeatureMask own = FeatureNone;
+    if (features.tracingEngine == TracingEngine::Software) own |= FeatureComputeTracing | FeatureFragmentTracing;
+    if (features.traversalEngine == TracingEngine::Software) own |= FeatureRayTracing;
     EXPECT_EQ(features.mask & ~(device.getInfo().features | own), 0u);
     EXPECT_EQ(features.computeTracing, features.has(FeatureComputeTracing));
     EXPECT_EQ(features.fragmentTracing, features.has(FeatureFragmentTracing));

@@ -81,6 +81,9 @@ MISUSE(RecursionBeyondTheLimit, "traversal.recursion") {
     return created(
         kit, [&](Traversal& traversal) { traversal.setRecursionDepth(kit.device.getFeatures().recursionDepth + 1); });
 }
+MISUSE(CallablesBeyondTheLimit, "traversal.callable_depth") {
+    return created(kit, [](Traversal& traversal) { traversal.setCallableDepth(Traversal::max_callable_depth + 1); });
+}
 MISUSE(RecordOfNoGroup, "traversal.record_group") {
     return created(kit, [](Traversal& traversal) {
         traversal.createShaderGLSL(Shader::TypeClosest, "void main() {}");

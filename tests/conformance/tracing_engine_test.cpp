@@ -74,6 +74,8 @@ protected:
 TEST_P(TracingEngineTest, IsNamedWithItsReason) {
     EXPECT_EQ(device.getFeatures().tracingEngine, TracingEngine::Software);
     EXPECT_THAT(device.getInfo().tracing, testing::AllOf(testing::HasSubstr("software"), testing::HasSubstr("asked")));
+    EXPECT_EQ(device.getFeatures().traversalEngine, TracingEngine::Software);
+    EXPECT_EQ(device.getInfo().traversal, "software (asked for)");
 }
 
 TEST_P(TracingEngineTest, IsChosenByTheEnvironment) {
@@ -88,7 +90,9 @@ TEST_P(TracingEngineTest, IsChosenByTheEnvironment) {
     const Device wrong = open("hardware");
     before ? setenv("GLINT_TRACING", kept.c_str(), 1) : unsetenv("GLINT_TRACING");
     EXPECT_EQ(software.getFeatures().tracingEngine, TracingEngine::Software);
+    EXPECT_EQ(software.getFeatures().traversalEngine, TracingEngine::Software);
     EXPECT_EQ(driver.getFeatures().tracingEngine, TracingEngine::Driver);
+    EXPECT_EQ(driver.getFeatures().traversalEngine, TracingEngine::Driver);
     EXPECT_THAT(wrong, HasErrorId("device.tracing"));
     EXPECT_THAT(wrong.error().message(), testing::HasSubstr("'hardware'"));
 }

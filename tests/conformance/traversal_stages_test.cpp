@@ -386,6 +386,49 @@ void main() {
               (Words{0 + 30 + 5, (1 + 30 + 5) * 100}));
 }
 
+TEST_F(TraversalStages, CallablesNestAsDeepAsTheySay) {
+    // Each level adds 1 on the way down and 100 on the way up, and keeps words of its own meanwhile.
+    const std::string callable = R"(
+layout(constant_id = 0) const uint depth = 1u;
+layout(location = 0) callableDataInEXT uint data;
+layout(location = 1) callableDataEXT uint inner;
+void main() {
+    uint kept[16];
+    for (uint i = 0u; i < 16u; i++) kept[i] = data * 3u + i;
+    data++;
+    if (data < depth) {
+        inner = data;
+        executeCallableEXT(0, 1);
+        data = inner;
+    }
+    uint sum = 0u;
+    for (uint i = 0u; i < 16u; i++) sum += kept[(data + i) % 16u];
+    data += 100u + sum * 10000u;
+}
+)";
+    constexpr const char* generation = R"(
+layout(binding = 0, std430) writeonly buffer Results { uint results[]; };
+layout(location = 0) callableDataEXT uint data;
+void main() {
+    data = 0u;
+    executeCallableEXT(0, 0);
+    results[gl_LaunchIDEXT.x] = data;
+}
+)";
+    for (const uint32_t depth : {3u, 5u}) {
+        const Traversal traversal = makeTraversal(
+            {{Shader::TypeRayGen, generation, {}}, {Shader::TypeCallable, callable, {}}}, [&](Traversal& made) {
+                made.setCallableDepth(depth);
+                made.setConstant(0u, depth);
+            });
+        EXPECT_EQ(traversal.getCallableDepth(), depth);
+        // 16 words of 3 * level + i each: 48 * level + 120.
+        uint32_t expected = depth + 100 * depth;
+        for (uint32_t level = 0; level < depth; level++) expected += (48 * level + 120) * 10000;
+        EXPECT_EQ(trace(traversal, 2, [](Compute& list) { list.dispatch(2); }), (Words{expected, expected}));
+    }
+}
+
 TEST_F(TraversalStages, RecursesToTheLimit) {
     const Tracing square = makeSquares({0});
     const Tracing scene = makeTop({place(square)});

@@ -221,6 +221,65 @@ void main() { counts[1] = 3u; counts[2] = 5u; counts[3] = 1u; }
     EXPECT_EQ(read<uint32_t>(results), expected);
 }
 
+// Where pipelines are joined, the counts are read by a kernel first, which judges them; else nobody does.
+TEST_F(TraversalTest, CountsBeyondTheLimitsStartNothing) {
+    if (device.getFeatures().traversalEngine == TracingEngine::Driver) GTEST_SKIP() << "the driver takes any counts";
+    const Traversal traversal = makeTraversal({{Shader::TypeRayGen, write_index, {}}});
+    const Words counts = {1u << 31, 1, 1, 1, 1u << 31, 1, 1, 1, 1u << 31, 1u << 15, 1u << 15, 2, 0, 5, 1, 2, 1, 1};
+    const Buffer buffer = makeBuffer(counts, Buffer::FlagIndirect);
+    for (uint64_t i = 0; i < counts.size(); i += 3) {
+        SCOPED_TRACE(i);
+        EXPECT_EQ(trace(traversal, 3, [&](Compute& list) { list.dispatchIndirect(buffer, i * 4); }),
+                  (i + 3 == counts.size() ? Words{0, 1, 0xdead} : Words(3, 0xdead)));
+    }
+}
+
+// Two in a row, of different generations, share what they keep on the device.
+TEST_F(TraversalTest, CountsFromBuffersTakeTurns) {
+    if (!device.getFeatures().indirectRays) GTEST_SKIP() << "the device reads no counts of rays from buffers";
+    constexpr const char* add = R"(
+layout(binding = 0, std430) buffer Results { uint results[]; };
+void main() { results[gl_LaunchIDEXT.x] = results[gl_LaunchIDEXT.x] * 10u + gl_LaunchSizeEXT.x + OWN; }
+)";
+    const Traversal traversal = makeTraversal({{Shader::TypeRayGen, add, "OWN=1"}, {Shader::TypeRayGen, add, "OWN=5"}});
+    const Buffer counts = makeBuffer(Words{2, 1, 1, 3, 1, 1}, Buffer::FlagIndirect);
+    const Buffer results = makeBuffer(Words(4, 0u));
+    compute([&](Compute& list) {
+        list.setStorageBuffer(0, results);
+        list.setTraversal(traversal);
+        list.dispatchIndirect(counts);
+        list.setTraversal(traversal, 1);
+        list.dispatchIndirect(counts, 12);
+        list.setTraversal(traversal);
+        list.dispatch(1);
+    });
+    EXPECT_EQ(read<uint32_t>(results), (Words{382, 38, 8, 0}));
+}
+
+TEST_F(TraversalTest, ResourcesThatNobodyUsesKeepTheirSlots) {
+    const Traversal traversal = makeTraversal({{Shader::TypeRayGen,
+                                                R"(
+layout(set = 0, binding = 0, std430) readonly buffer Unused { uint unused[]; };
+layout(set = 0, binding = 1, std430) readonly buffer From { uint from[]; };
+layout(set = 1, binding = 0) uniform Forgotten { vec4 forgotten; };
+layout(set = 1, binding = 1) uniform Added { uvec4 added; };
+layout(set = 2, binding = 3, std430) writeonly buffer To { uint to[]; };
+void main() { to[gl_LaunchIDEXT.x] = from[gl_LaunchIDEXT.x] + added.y; }
+)",
+                                                {}}});
+    EXPECT_EQ(traversal.getSlots(SlotKind::Storage), 3u);
+    const Buffer results = makeBuffer(Words(2, 0xdeadu));
+    compute([&](Compute& list) {
+        list.setTraversal(traversal);
+        list.setStorageBuffers(0, {makeBuffer(Words(2, 1u)), makeBuffer(Words(2, 7u))});
+        list.setStorageBuffer("To", results);
+        list.setUniform(0, std::array<float, 4>{});
+        list.setUniform(1, std::array<uint32_t, 4>{1, 20, 3, 4});
+        list.dispatch(2);
+    });
+    EXPECT_EQ(read<uint32_t>(results), (Words{27, 27}));
+}
+
 TEST_F(TraversalTest, ConstantsReachEveryStage) {
     const Tracing squares = makeSquares({0});
     const Tracing scene = makeTop({place(squares)});

@@ -1,5 +1,5 @@
-// Ray-tracing pipelines on the null device, whose checker judges what they read and write: with the driver's engine,
-// and beside the software engine.
+// Ray-tracing pipelines on the null device, whose checker judges what they read and write: the driver's, joined into
+// kernels, and the driver's beside ray queries of the software engine, where structures are built by both.
 
 #include "support/matchers.h"
 
@@ -20,10 +20,19 @@ namespace {
 using null::HazardChecker;
 using null::NullControl;
 
-class TraversalOnNull : public testing::TestWithParam<TracingEngine> {
+constexpr FeatureMask queries = FeatureComputeTracing | FeatureFragmentTracing;
+
+enum class Form : uint8_t { Driver, Joined, Twins };
+const char* nameOf(Form form) { return form == Form::Driver ? "Driver" : form == Form::Joined ? "Joined" : "Twins"; }
+
+class TraversalOnNull : public testing::TestWithParam<Form> {
 protected:
     void SetUp() override {
-        device = Device::create({.api = "null", .tracing = GetParam(), .message = [this](const Message& message) {
+        const null::ScopedSettings settings(
+            {.missing = GetParam() == Form::Twins ? queries : FeatureMask(FeatureNone)});
+        const TracingEngine engines[] = {TracingEngine::Driver, TracingEngine::Software, TracingEngine::Auto};
+        const TracingEngine engine = engines[static_cast<size_t>(GetParam())];
+        device = Device::create({.api = "null", .tracing = engine, .message = [this](const Message& message) {
                                      if (!is_failing) ADD_FAILURE() << message.error.text();
                                  }});
         ASSERT_TRUE(device) << device.error().text();
@@ -133,8 +142,8 @@ TEST_P(TraversalOnNull, CountsWaitForWhoWritesThem) {
                   list.setStorageBuffers(0, {buffers[0], buffers[1]});
                   list.dispatchIndirect(buffers[2], 16);
               }),
-              // One for all: what the rays wrote, and the counts.
-              1u);
+              // One for all: what the rays wrote, and the counts. Joined, they are copied, judged, and read.
+              GetParam() == Form::Joined ? 3u : 1u);
 }
 
 TEST_P(TraversalOnNull, TracesFollowWhatWasBuilt) {
@@ -186,7 +195,8 @@ TEST_P(TraversalOnNull, GoesWhenTheQueueHasPassedIt) {
     barriers([&](Compute& list) { trace(list, top, buffers[0], buffers[1]); });
     const uint64_t objects = control->counters().objects;
     traversal = {};
-    EXPECT_EQ(control->counters().objects, objects);
+    // A joined one has memory for counts that no list has used.
+    EXPECT_EQ(control->counters().objects, objects - (GetParam() == Form::Joined));
     top = {};
     control->release(Queue::Main);
     EXPECT_THAT(device.finish(), IsOk());
@@ -238,7 +248,7 @@ TEST_P(TraversalOnNull, BuildsSideBySideHaveScratchMemoryOfTheirOwn) {
         instances.push_back({.tracing = &all.back()});
     }
     ASSERT_THAT(device.buildTracings(all, Buffer(), Tracing::FlagCompact), IsOk());
-    EXPECT_EQ(largest, 8u);
+    EXPECT_EQ(largest, GetParam() == Form::Joined ? 0u : 8u);
     const Tracing top = device.createTracing(instances);
     // Compacted structures have no size of a build any more, only that of an update.
     largest = 0;
@@ -247,17 +257,63 @@ TEST_P(TraversalOnNull, BuildsSideBySideHaveScratchMemoryOfTheirOwn) {
         list.buildTracing(top);
         trace(list, top, buffers[0], buffers[1]);
     });
-    if (GetParam() == TracingEngine::Software) { EXPECT_EQ(largest, 8u); }
+    if (GetParam() == Form::Twins) { EXPECT_EQ(largest, 8u); }
     control->setObserver({});
 }
 
-INSTANTIATE_TEST_SUITE_P(Engines, TraversalOnNull, testing::Values(TracingEngine::Driver, TracingEngine::Software),
-                         [](const auto& test) { return std::string(toString(test.param)); });
+INSTANTIATE_TEST_SUITE_P(Engines, TraversalOnNull, testing::Values(Form::Driver, Form::Joined, Form::Twins),
+                         [](const auto& test) { return std::string(nameOf(test.param)); });
+
+TEST(TraversalChoice, FollowsWhatWasAskedForAndIsThere) {
+    using enum TracingEngine;
+    struct Case {
+        TracingEngine wanted;
+        FeatureMask missing;
+        TracingEngine traversal, tracing;
+    };
+    const Case cases[] = {
+        {Auto, FeatureNone, Driver, Driver},
+        {Auto, queries, Driver, Software},
+        {Auto, FeatureRayTracing, Software, Driver},
+        {Auto, FeatureRayTracing | queries, Software, Software},
+        {Driver, FeatureNone, Driver, Driver},
+        {Software, FeatureNone, Software, Software},
+        {Software, FeatureRayTracing | queries, Software, Software},
+    };
+    for (const Case& item : cases) {
+        SCOPED_TRACE(toString(item.wanted) + (" without " + featureNames(item.missing)));
+        const null::ScopedSettings settings({.missing = item.missing});
+        Device device = Device::create({.api = "null", .required = FeatureRayTracing, .tracing = item.wanted});
+        ASSERT_THAT(device, IsOk());
+        const Features& features = device.getFeatures();
+        EXPECT_TRUE(features.rayTracing);
+        EXPECT_EQ(features.traversalEngine, item.traversal);
+        EXPECT_EQ(features.tracingEngine, item.tracing);
+        EXPECT_EQ(device.createTraversal().state(), ObjectState::Building);
+    }
+    // Without the feature there is none, whoever it would have been.
+    const null::ScopedSettings settings({.missing = FeatureRayTracing});
+    const auto ignore = [](const Message&) {};
+    Device driver = Device::create({.api = "null", .tracing = Driver, .message = ignore});
+    EXPECT_FALSE(driver.getFeatures().rayTracing);
+    EXPECT_THAT(driver.getInfo().traversal, testing::HasSubstr("none"));
+    EXPECT_THAT(driver.createTraversal(), HasErrorId("device.unsupported"));
+    Device bare = Device::create({.api = "null", .optional = queries, .message = ignore});
+    EXPECT_FALSE(bare.getFeatures().rayTracing);
+    EXPECT_THAT(bare.createTraversal(), HasErrorId("device.unsupported"));
+    // Queries come along only where pipelines become queries.
+    const Device joined = Device::create({.api = "null", .required = FeatureRayTracing, .optional = 0});
+    EXPECT_EQ(joined.getFeatures().mask, FeatureRayTracing | FeatureComputeTracing);
+    const null::ScopedSettings all({});
+    const Device alone = Device::create({.api = "null", .required = FeatureRayTracing, .optional = 0});
+    EXPECT_EQ(alone.getFeatures().mask, FeatureMask(FeatureRayTracing));
+}
 
 TEST(TraversalBesideNone, CostsNothing) {
-    // Only a device with a traversal has structures of the driver's beside the software engine's.
-    const auto count = [](bool with_traversal) {
-        Device device = Device::create({.api = "null", .tracing = TracingEngine::Software});
+    // Only a device with a traversal of the driver's has structures of the driver's beside the software engine's.
+    const auto count = [](bool with_traversal, TracingEngine engine) {
+        const null::ScopedSettings settings({.missing = queries});
+        Device device = Device::create({.api = "null", .tracing = engine});
         if (with_traversal) device.createTraversal();
         const Buffer vertices = device.createBuffer(Buffer::FlagTracing, 36, "vertices");
         Tracing bottom = device.createTracing("bottom");
@@ -267,8 +323,9 @@ TEST(TraversalBesideNone, CostsNothing) {
         EXPECT_THAT(device.finish(), IsOk());
         return NullControl::last()->counters().builds;
     };
-    EXPECT_EQ(count(false), 0u);
-    EXPECT_EQ(count(true), 1u);
+    EXPECT_EQ(count(false, TracingEngine::Auto), 0u);
+    EXPECT_EQ(count(true, TracingEngine::Auto), 1u);
+    EXPECT_EQ(count(true, TracingEngine::Software), 0u);
 }
 
 }  // namespace

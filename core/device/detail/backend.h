@@ -201,6 +201,7 @@ struct TraversalDesc {
     std::array<std::vector<Record>, ray_tables> tables;
     const BindingLayout* layout = nullptr;
     uint32_t recursion_depth = 1;
+    uint32_t callable_depth = 2;
     std::string name;
 };
 

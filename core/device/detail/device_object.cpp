@@ -4,6 +4,7 @@
 #include <glint/base/log.h>
 #include <glint/device/detail/backends.h>
 #include <glint/device/detail/recorder_core.h>
+#include <glint/shader/traversal_joiner.h>
 #include <glint/tracing/detail/hierarchy.h>
 
 #include <algorithm>
@@ -14,8 +15,29 @@ namespace glint::detail {
 
 namespace {
 
-/// How deep rays of a joined traversal nest: as deep as lavapipe's own.
-constexpr uint32_t joined_recursion = 31;
+constexpr FeatureMask query_features = FeatureComputeTracing | FeatureFragmentTracing;
+
+// What a joined traversal takes.
+constexpr uint32_t joined_recursion = 31;       // as lavapipe's own
+constexpr uint64_t joined_rays = 1ull << 30;    // what Vulkan asks of every device
+constexpr uint32_t joined_attribute_size = 32;  // likewise
+constexpr uint32_t joined_record_size = shader::max_frame_words * 4;
+
+struct EngineChoice {
+    TracingEngine engine;
+    std::string reason;
+};
+
+/// The one rule, for ray queries and for pipelines: `asked` are the features of either that were asked for.
+EngineChoice chooseEngine(TracingEngine wanted, FeatureMask asked, const Features& driver, const DeviceInfo& info,
+                          std::string_view what) {
+    if (!asked) return {TracingEngine::Driver, fmt::format("no {} asked for", what)};
+    if (wanted != TracingEngine::Auto) return {wanted, "asked for"};
+    if (const FeatureMask lacking = asked & ~driver.mask)
+        return {TracingEngine::Software, fmt::format("the driver lacks {}", featureNames(lacking))};
+    if (info.cpu) return {TracingEngine::Software, "faster than the driver's on a CPU"};
+    return {TracingEngine::Driver, "the driver's, on a device that is no CPU"};
+}
 
 /// What a program asks for, else what the environment does.
 Expected<TracingEngine> askedEngine(TracingEngine engine) {
@@ -45,6 +67,7 @@ DeviceObject::~DeviceObject() {
     scratch_ = {};
     heap_ = {};
     mipmaps_.clear();
+    ray_count_kernel_ = {};
     for (RecorderCore* recorder : recorders_) delete recorder;
     // The device is idle or lost: nothing is in use any more. Deleting one may retire others.
     while (!retired_.empty()) {
@@ -80,53 +103,78 @@ Status DeviceObject::open(const DeviceDesc& desc, Where where) {
     const Expected<TracingEngine> engine = askedEngine(desc.tracing);
     if (!engine) return fail(engine.error());
     // What Glint provides itself, no driver has to.
-    constexpr FeatureMask queries = FeatureComputeTracing | FeatureFragmentTracing;
-    if (*engine == TracingEngine::Auto) backend_desc.optional |= desc.required & queries;
-    if (*engine != TracingEngine::Driver) backend_desc.required &= ~queries;
-    if (*engine == TracingEngine::Software) backend_desc.optional &= ~queries;
+    constexpr FeatureMask own = query_features | FeatureRayTracing;
+    const FeatureMask asked = (desc.required | desc.optional) & own;
+    if (*engine != TracingEngine::Driver) {
+        backend_desc.required &= ~own;
+        backend_desc.optional &= ~own;
+    }
+    if (*engine == TracingEngine::Auto) {
+        backend_desc.optional |= asked;
+        // Pipelines that are joined become ray queries.
+        if (asked & FeatureRayTracing) backend_desc.optional |= FeatureComputeTracing;
+    }
     Expected<std::unique_ptr<Backend>> made = createBackend(desc.api, backend_desc);
     if (!made) return fail(made.error());
     backend = std::move(*made);
-    chooseEngine(*engine, (desc.required | desc.optional) & queries);
+    chooseEngines(*engine, asked);
     setReady();
     return {};
 }
 
-bool DeviceObject::joinsTraversals() const {
-    const char* const asked = std::getenv("GLINT_TRAVERSAL");
-    return heap_ && asked && std::strcmp(asked, "software") == 0;
-}
-
-void DeviceObject::chooseEngine(TracingEngine wanted, FeatureMask queries) {
-    features_ = backend->features();
+void DeviceObject::chooseEngines(TracingEngine wanted, FeatureMask asked) {
+    const Features& driver = backend->features();
+    features_ = driver;
     info_ = backend->info();
-    const bool offered = (features_.mask & queries) == queries;
-    TracingEngine engine = wanted;
-    std::string reason = "asked for";
-    if (queries == 0) {
-        engine = TracingEngine::Driver;
-        reason = "no ray queries asked for";
-    } else if (wanted == TracingEngine::Auto) {
-        engine = offered && !info_.cpu ? TracingEngine::Driver : TracingEngine::Software;
-        reason = !offered    ? "the driver offers no ray queries for these stages"
-                 : info_.cpu ? "faster than the driver's on a CPU"
-                             : "the driver's, on a device that is no CPU";
-    }
-    features_.tracingEngine = engine;
-    if (engine == TracingEngine::Software) {
-        features_.mask |= queries;
-        features_.computeTracing = features_.has(FeatureComputeTracing);
-        features_.fragmentTracing = features_.has(FeatureFragmentTracing);
+
+    const EngineChoice pipelines =
+        chooseEngine(wanted, asked & FeatureRayTracing, driver, info_, "ray-tracing pipelines");
+    const bool joins = pipelines.engine == TracingEngine::Software;
+    if (joins) asked |= FeatureComputeTracing;
+    const EngineChoice queries = chooseEngine(wanted, asked & query_features, driver, info_, "ray queries");
+    features_.traversalEngine = pipelines.engine;
+    features_.tracingEngine = queries.engine;
+
+    features_.mask &= ~query_features | asked;
+    if (queries.engine == TracingEngine::Software) {
+        features_.mask |= asked & query_features;
         features_.maxTracingPrimitives = features_.maxTracingInstances = max_primitives;
         features_.scratchAlignment = std::max(features_.scratchAlignment, features_.storageAlignment);
         heap_ = std::make_shared<TracingHeap>(*this);
     }
-    if (joinsTraversals()) {
-        features_.recursionDepth = std::min(features_.recursionDepth, joined_recursion);
-        features_.indirectRays = false;
+    if (joins) {
+        features_.mask |= FeatureRayTracing;
+        features_.recursionDepth = joined_recursion;
+        features_.maxRays = joined_rays;
+        features_.maxRecordSize = joined_record_size;
+        features_.maxAttributeSize = joined_attribute_size;
+        features_.indirectRays = true;
     }
-    info_.tracing = fmt::format("{}{} ({})", toString(engine),
-                                heap_ ? fmt::format(", nodes read as {}", toString(heap_->form())) : "", reason);
+    features_.computeTracing = features_.has(FeatureComputeTracing);
+    features_.fragmentTracing = features_.has(FeatureFragmentTracing);
+    features_.rayTracing = features_.has(FeatureRayTracing);
+
+    info_.tracing =
+        fmt::format("{}{} ({})", toString(queries.engine),
+                    heap_ ? fmt::format(", nodes read as {}", toString(heap_->form())) : "", queries.reason);
+    info_.traversal = features_.rayTracing ? fmt::format("{} ({})", toString(pipelines.engine), pipelines.reason)
+                                           : fmt::format("none ({})", (asked & FeatureRayTracing)
+                                                                          ? "the driver offers no ray-tracing pipelines"
+                                                                          : pipelines.reason);
+}
+
+Expected<KernelObject*> DeviceObject::rayCountKernel(Where where) {
+    std::lock_guard lock(ray_count_mutex_);
+    if (ray_count_kernel_) return ray_count_kernel_.get();
+    const Shader shader =
+        Shader::createGLSL(Shader::TypeCompute, "#include <glint/tracing/ray_counts.h>\n", {}, "counts of rays");
+    if (!shader) return unexpected(shader.error());
+    auto made = Ref<KernelObject>::adopt(new KernelObject(this));
+    made->setName("counts of rays");
+    made->shaders.emplace_back(static_cast<ShaderObject*>(shader.object()));
+    if (Status status = made->create(where); !status) return unexpected(status.error());
+    ray_count_kernel_ = std::move(made);
+    return ray_count_kernel_.get();
 }
 
 void DeviceObject::adopt(std::unique_ptr<Backend> made, MessageCallback message) {
@@ -134,7 +182,7 @@ void DeviceObject::adopt(std::unique_ptr<Backend> made, MessageCallback message)
     backend = std::move(made);
     const Expected<TracingEngine> engine = askedEngine(TracingEngine::Auto);
     if (!engine) report(engine.error());
-    chooseEngine(engine ? *engine : TracingEngine::Auto, FeatureComputeTracing | FeatureFragmentTracing);
+    chooseEngines(engine ? *engine : TracingEngine::Auto, query_features | FeatureRayTracing);
     setReady();
 }
 

@@ -36,9 +36,13 @@ public:
     /// The heap of the software engine, null if the driver answers ray queries.
     TracingHeap* heap() const { return heap_.get(); }
     MipmapKernels& mipmaps() { return mipmaps_; }
-    /// Whether pipelines of rays are joined into kernels for the software engine: with $GLINT_TRAVERSAL "software".
-    bool joinsTraversals() const;
-    /// From here on the driver builds structures beside the software engine.
+    /// The kernel that turns counts of rays into the arguments of a dispatch. From any thread.
+    Expected<KernelObject*> rayCountKernel(Where where);
+    /// Whether ray-tracing pipelines are joined into kernels with ray queries, whoever answers those.
+    bool joinsTraversals() const {
+        return features_.rayTracing && features_.traversalEngine == TracingEngine::Software;
+    }
+    /// From here on the driver builds structures beside the software engine: its pipelines are to see them.
     void buildForTraversals() { traversals_.store(true, std::memory_order_relaxed); }
     bool buildsForTraversals() const { return heap_ && traversals_.load(std::memory_order_relaxed); }
 
@@ -123,8 +127,8 @@ private:
         std::array<uint64_t, queue_count> last_use;
     };
 
-    /// Decides who answers ray queries; `queries` are the features of them that were asked for.
-    void chooseEngine(TracingEngine wanted, FeatureMask queries);
+    /// Decides who answers ray queries and who runs pipelines; `asked` are the features of either that were asked for.
+    void chooseEngines(TracingEngine wanted, FeatureMask asked);
     Status upload(TracingObject& tracing, const Hierarchy& hierarchy, Where where);
     RecorderCore* takeRecorder(Queue queue, std::string_view name);
     Error checkPictures(const RecorderCore& recorder) const;
@@ -137,6 +141,8 @@ private:
     DeviceInfo info_;
     std::shared_ptr<TracingHeap> heap_;
     MipmapKernels mipmaps_{*this};
+    std::mutex ray_count_mutex_;
+    Ref<KernelObject> ray_count_kernel_;
     std::atomic<bool> traversals_ = false;
 
     std::mutex submit_mutex_;  // of tracker_, next_value_, scratch below, last_use of objects

@@ -8,6 +8,7 @@
 #include <glint/device/pipeline.h>
 #include <glint/shader/shader_compiler.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstdint>
@@ -228,6 +229,9 @@ public:
     /// Slots of each kind that were declared, -1 if none were, and the stages that see them.
     std::array<int32_t, static_cast<size_t>(SlotKind::Count)> declared = {-1, -1, -1, -1, -1, -1, -1, -1};
     std::array<std::vector<ShaderMask>, static_cast<size_t>(SlotKind::Count)> masks;
+    /// Of a kernel that a traversal has been joined into: what the traversal's shaders declare, though the kernel may
+    /// have lost what none of them uses. They are slots all the same.
+    std::vector<ShaderResource> joined_resources;
     BindingLayout layout;
     /// Where element 0 of BindingLayout::resources[i] stands in a binding block.
     std::vector<uint32_t> first_element;  ///< hidden ones follow
@@ -250,6 +254,7 @@ private:
     Expected<std::vector<Ref<ShaderObject>>> forEngine(const std::vector<Ref<ShaderObject>>& compiled,
                                                        Where where) const;
     Expected<Stages> specialize(std::vector<Ref<ShaderObject>> compiled, Where where) const;
+    Reflection joinedDeclarations(const Stages& stages) const;
     Error checkFeatures(const Reflection& stage, Where where) const;
     Error checkResource(const ShaderResource& resource, Where where) const;
     Error checkTables(const BindingLayout& merged, Where where) const;
@@ -311,18 +316,34 @@ public:
     std::array<std::vector<TraversalDesc::Group>, ray_tables> groups;
     std::array<std::vector<Record>, ray_tables> records;
     uint32_t recursion_depth = 1;
-    /// In software: the stages joined into one kernel, which is what lists play, and its binding table.
+    uint32_t callable_depth = 2;
+    /// In software: the stages joined into one kernel, which is what lists play, its binding table, and what a dispatch
+    /// with counts from a buffer begins with (JoinedLaunch).
     Ref<KernelObject> joined;
     Ref<BufferObject> joined_records;
+    Ref<BufferObject> joined_launch;
 
 private:
     Status check(const Stages& stages, Where where) const;
     Status join(const Stages& stages, Where where);
+    Status createJoinedBuffers(Where where);
     std::vector<uint32_t> recordWords() const;
     Error checkRecords(const Stages& stages, Where where) const;
     bool isCalled(const Stages& stages, uint32_t shader) const;
     Error checkVariables(const Stages& stages, Where where) const;
     Expected<std::unique_ptr<Native>> createNative(const Stages& stages, Where where) override;
+};
+
+/// TraversalObject::joined_launch, as shaders/tracing/ray_counts.h has it: two parts, each where a block may begin.
+struct JoinedLaunch {
+    static constexpr uint64_t counts = 0;
+    static constexpr uint64_t groups = 16;
+    static constexpr uint64_t arguments_size = 32;
+    /// Of the block GlintLaunch, for a device with these alignments.
+    static uint64_t rays(const Features& features) {
+        return std::max<uint64_t>({arguments_size, features.uniformAlignment, features.storageAlignment});
+    }
+    static constexpr uint64_t rays_size = 16;
 };
 
 class QueryObject final : public Object {

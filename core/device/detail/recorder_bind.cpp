@@ -43,7 +43,7 @@ RecorderCore::Bound* RecorderCore::bind(SlotKind kind, const Slot& slot, uint32_
         if (index < 0) {
             const std::string wanted = slot.name_ ? fmt::format("named '{}'", slot.name_)
                                                   : fmt::format("at set {}, binding {}", slot.set_, slot.binding_);
-            fail(slot.where_, ErrorCode::InvalidArgument, "bind.name", "{} has no {} {}", program_->label(),
+            fail(slot.where_, ErrorCode::InvalidArgument, "bind.name", "{} has no {} {}", programLabel(),
                  toString(kind), wanted);
             return nullptr;
         }
@@ -231,7 +231,7 @@ bool RecorderCore::checkBound(const ShaderResource& resource, SlotKind kind, uin
                               const char* what, Where where) {
     const auto complain = [&]<class... Args>(const char* id, fmt::format_string<Args...> format, Args&&... args) {
         fail(where, ErrorCode::InvalidArgument, id, "{}: {} {} '{}' of {} {}", what, toString(kind), slot,
-             resource.name, program_->label(), fmt::format(format, std::forward<Args>(args)...));
+             resource.name, programLabel(), fmt::format(format, std::forward<Args>(args)...));
         return false;
     };
     if (!bound.set) return complain("bind.unset", "has not been set");
@@ -265,16 +265,17 @@ bool RecorderCore::checkBound(const ShaderResource& resource, SlotKind kind, uin
             return true;
         }
         case SlotKind::Tracing: {
-            if (program_->type() != ObjectType::Traversal) return true;
+            if (!traversal_) return true;
             const auto& tracing = *static_cast<const TracingObject*>(list_.resources[value.resource]);
-            const TracingObject* const old = device_->heap() ? notBuiltByDriver(tracing) : nullptr;
+            const bool has_twin = device_->heap() && !traversal_->joined;
+            const TracingObject* const old = has_twin ? notBuiltByDriver(tracing) : nullptr;
             if (old)
                 return complain("tracing.traversal",
                                 "is {}; {} was built before the device's first Traversal, so that the driver knows "
                                 "nothing of it: build it again, and then what refers to it",
                                 tracing.label(), old == &tracing ? "it" : old->label());
             // Without any hit record no shader is looked up.
-            const uint32_t records = static_cast<const TraversalObject*>(program_)->countRecords(RayTable::Hit);
+            const uint32_t records = traversal_->countRecords(RayTable::Hit);
             if (records && tracing.built_offset >= records)
                 return complain("traversal.hit_record",
                                 "is {}, an instance of which has offset {}; there are {} hit records", tracing.label(),
@@ -292,7 +293,7 @@ bool RecorderCore::checkTable(const ShaderResource& resource, const TableContent
                               const char* what, Where where) {
     const auto complain = [&](const char* id, const std::string& text) {
         fail(where, ErrorCode::InvalidArgument, id, "{}: table {} '{}' of {} {}", what, slot, resource.name,
-             program_->label(), text);
+             programLabel(), text);
         return false;
     };
     if (table.element != resource.element)
@@ -460,7 +461,7 @@ bool RecorderCore::flushPush(const char* what, Where where) {
     const uint32_t wanted = program_->layout.push_size;
     if (wanted > push_size_) {
         fail(where, ErrorCode::InvalidArgument, "bind.push_size",
-             "{}: the push constants of {} have {} bytes, {} bytes were given", what, program_->label(), wanted,
+             "{}: the push constants of {} have {} bytes, {} bytes were given", what, programLabel(), wanted,
              push_size_);
         return false;
     }

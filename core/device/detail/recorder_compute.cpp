@@ -20,7 +20,7 @@ void RecorderCore::setKernel(const Kernel& kernel, Where where) {
     if (kernel.state() == ObjectState::Building) static_cast<KernelObject*>(kernel.object())->waitCreated();
     if (!usable(kernel, "setKernel", where)) return;
     setProgram(*static_cast<KernelObject*>(kernel.object()));
-    ray_records_ = none;
+    traversal_ = nullptr;
 }
 
 void RecorderCore::setTraversal(const Traversal& traversal, uint32_t generation, Where where) {
@@ -32,23 +32,10 @@ void RecorderCore::setTraversal(const Traversal& traversal, uint32_t generation,
         return fail(where, ErrorCode::OutOfRange, "traversal.generation",
                     "setTraversal: ray-generation shader {} of {}, which has {}", generation, object->label(), count);
     ray_generation_ = generation;
-    ray_records_ = none;
+    traversal_ = object;
     if (!object->joined) return setProgram(*object);
+    use(*object);
     setProgram(*object->joined);
-    ray_records_ = use(*object->joined_records);
-}
-
-/// Puts the blocks of a joined traversal's records and launch, its last ones, into their slots, or what was there
-/// before.
-void RecorderCore::swapLaunch(std::array<Bound, 2>& bound) {
-    constexpr SlotKind kinds[] = {SlotKind::Storage, SlotKind::Uniform};
-    for (size_t i = 0; i < bound.size(); i++) {
-        const auto kind = static_cast<size_t>(kinds[i]);
-        const size_t slots = program_->layout.slots[kind].size();
-        if (bound_[kind].size() < slots) bound_[kind].resize(slots);
-        std::swap(bound_[kind][slots - 1], bound[i]);
-    }
-    bindings_dirty_ = uniforms_dirty_ = true;
 }
 
 void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Where where) {
@@ -56,7 +43,7 @@ void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Whe
     if (!program_)
         return fail(where, ErrorCode::InvalidArgument, "dispatch.kernel",
                     "dispatch: no kernel or traversal has been set");
-    if (program_->type() == ObjectType::Traversal) return traceRays(width, height, depth, where);
+    if (traversal_) return traceRays(width, height, depth, where);
     const auto& kernel = static_cast<const KernelObject&>(*program_);
     const Features& features = device_->features();
     const uint64_t threads[3] = {width, height, depth};
@@ -71,22 +58,7 @@ void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Whe
                         kernel.group_size[i], count, "xyz"[i], limits[i]);
         groups[i] = static_cast<uint32_t>(count);
     }
-    std::array<Bound, 2> launch;
-    const bool is_joined = ray_records_ != none;
-    if (is_joined) {
-        const uint32_t rays[4] = {static_cast<uint32_t>(width), static_cast<uint32_t>(height),
-                                  static_cast<uint32_t>(depth), ray_generation_};
-        launch[0].set = launch[1].set = true;
-        launch[0].value.resource = ray_records_;
-        launch[0].value.size = static_cast<const BufferObject*>(list_.resources[ray_records_])->size;
-        launch[1].inlined = true;
-        launch[1].value.offset = appendInline(rays, sizeof(rays), features.uniformAlignment, sizeof(rays));
-        launch[1].value.size = sizeof(rays);
-        swapLaunch(launch);
-    }
-    const bool flushed = flushBindings("dispatch", where) && flushPush("dispatch", where);
-    if (is_joined) swapLaunch(launch);
-    if (!flushed) return;
+    if (!flushBindings("dispatch", where) || !flushPush("dispatch", where)) return;
     beginAccesses();
     auto& command = push<DispatchCommand>(CommandType::Dispatch);
     shareAccesses(command.header);
@@ -95,40 +67,12 @@ void RecorderCore::dispatch(uint64_t width, uint64_t height, uint64_t depth, Whe
     std::copy(groups, groups + 3, command.groups);
 }
 
-void RecorderCore::traceRays(uint64_t width, uint64_t height, uint64_t depth, Where where) {
-    const Features& features = device_->features();
-    const uint64_t rays[3] = {width, height, depth};
-    // Vulkan bounds each side by that of a dispatch, in threads.
-    const uint64_t limits[3] = {uint64_t(features.maxGroupCountX) * features.maxGroupSizeX,
-                                uint64_t(features.maxGroupCountY) * features.maxGroupSizeY,
-                                uint64_t(features.maxGroupCountZ) * features.maxGroupSizeZ};
-    uint64_t left = features.maxRays;
-    for (size_t i = 0; i < 3; i++) {
-        if (rays[i] == 0) return;
-        left /= rays[i];
-    }
-    for (size_t i = 0; i < 3; i++)
-        if (left == 0 || rays[i] > std::min<uint64_t>(limits[i], UINT32_MAX))
-            return fail(where, ErrorCode::OutOfRange, "dispatch.rays",
-                        "dispatch: {} x {} x {} rays, the limits are {} x {} x {} and {} in all", width, height, depth,
-                        limits[0], limits[1], limits[2], features.maxRays);
-    if (!flushBindings("dispatch", where) || !flushPush("dispatch", where)) return;
-    beginAccesses();
-    auto& command = push<TraceRaysCommand>(CommandType::TraceRays);
-    shareAccesses(command.header);
-    command.traversal = program_resource_;
-    command.generation = ray_generation_;
-    command.bindings = bindings_;
-    std::copy(rays, rays + 3, command.rays);
-}
-
 void RecorderCore::dispatchIndirect(const Buffer& buffer, uint64_t offset, Where where) {
     if (!recording(where)) return;
     if (!program_)
         return fail(where, ErrorCode::InvalidArgument, "dispatch.kernel",
                     "dispatchIndirect: no kernel or traversal has been set");
-    const bool is_traversal = program_->type() == ObjectType::Traversal;
-    if ((is_traversal || ray_records_ != none) && !device_->features().indirectRays)
+    if (traversal_ && !device_->features().indirectRays)
         return fail(where, ErrorCode::Unsupported, "dispatch.rays_indirect",
                     "dispatchIndirect: {} takes no counts of rays from a buffer", device_->info().name);
     BufferObject* object = usableBuffer(buffer, Buffer::FlagIndirect, "dispatchIndirect", where);
@@ -137,20 +81,11 @@ void RecorderCore::dispatchIndirect(const Buffer& buffer, uint64_t offset, Where
         return fail(where, ErrorCode::OutOfRange, "dispatch.indirect",
                     "dispatchIndirect: 12 bytes at offset {} of {} of {} bytes; offsets are multiples of 4", offset,
                     object->label(), object->size);
+    if (traversal_) return traceRaysIndirect(*object, offset, where);
     if (!flushBindings("dispatchIndirect", where) || !flushPush("dispatchIndirect", where)) return;
     const uint32_t resource = use(*object);
     beginAccesses();
     access(resource, Stage::Indirect, AccessRead);
-    if (is_traversal) {
-        auto& command = push<TraceRaysIndirectCommand>(CommandType::TraceRaysIndirect);
-        shareAccesses(command.header);
-        command.traversal = program_resource_;
-        command.generation = ray_generation_;
-        command.bindings = bindings_;
-        command.buffer = resource;
-        command.offset = offset;
-        return;
-    }
     auto& command = push<DispatchIndirectCommand>(CommandType::DispatchIndirect);
     shareAccesses(command.header);
     command.kernel = program_resource_;

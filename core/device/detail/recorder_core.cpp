@@ -26,6 +26,7 @@ void RecorderCore::begin(Queue queue, std::string_view name) {
     graphics_ = false;
     generation_++;
     program_ = nullptr;
+    traversal_ = nullptr;
     bindings_ = {};
     bindings_dirty_ = uniforms_dirty_ = push_dirty_ = vertices_dirty_ = dynamic_dirty_ = true;
     first_shared_ = shared_count_ = 0;

@@ -240,8 +240,14 @@ private:
     /// Of the accesses that were begun.
     void copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size);
     void makeMipmap(TextureObject& texture, const MipmapPlan& plan, size_t index, BufferObject& scratch, Where where);
-    void swapLaunch(std::array<Bound, 2>& bound);
+    std::array<uint64_t, 3> rayLimits() const;
     void traceRays(uint64_t width, uint64_t height, uint64_t depth, Where where);
+    void traceRaysIndirect(BufferObject& counts, uint64_t offset, Where where);
+    void traceJoined(const std::array<uint32_t, 3>& rays, Where where);
+    void traceJoinedIndirect(BufferObject& counts, uint64_t offset, Where where);
+    bool flushJoined(const Bound& launch, const char* what, Where where);
+    /// What the program is to its user: a traversal, also where a joined kernel is played in its place.
+    std::string programLabel() const { return traversal_ ? traversal_->label() : program_->label(); }
     bool checkReferences(const TracingObject& tracing, Where where);
     void confirmBuild(TracingObject& tracing);
     uint64_t bindReferences(const ShaderResource& resource, Bound& bound);
@@ -281,8 +287,8 @@ private:
     std::vector<Use> uses_;
     ProgramObject* program_ = nullptr;  ///< the list keeps it alive
     uint32_t program_resource_ = 0;
+    TraversalObject* traversal_ = nullptr;  ///< what is set, if it is one: `program_` itself, or joined into that
     uint32_t ray_generation_ = 0;
-    uint32_t ray_records_ = none;  ///< of a joined traversal, whose kernel is `program_`
     bool bindings_dirty_ = true;
     bool uniforms_dirty_ = true;
     bool push_dirty_ = true;

@@ -42,7 +42,7 @@ int main(int argc, char** argv) {
 
     const Expected<TraversalScene> places = TraversalScene::load(mesh_path);
     if (!places) return report(places.error());
-    Device device = openDevice(example, FeatureComputeTracing);
+    Device device = openDevice(example, use_query ? FeatureComputeTracing : FeatureNone);
     if (!device) return report(device.error());
     use_query = use_query || needsQueries(example, device, 1);
 

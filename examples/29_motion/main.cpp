@@ -129,7 +129,7 @@ int main(int argc, char** argv) {
 
     const Expected<CourseStage> stage = CourseStage::load(mesh_path);
     if (!stage) return report(stage.error());
-    Device device = openDevice(example, FeatureComputeTracing);
+    Device device = openDevice(example, use_query ? FeatureComputeTracing : FeatureNone);
     if (!device) return report(device.error());
     use_query = use_query || needsQueries(example, device, 1);
     const char* shader = EXAMPLE_DIR "/main.shader";

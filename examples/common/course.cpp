@@ -103,7 +103,8 @@ int Course::run(uint32_t recursion, const std::function<void(Traversal&)>& load,
     Expected<CourseStage> stage = CourseStage::load(mesh_);
     if (!stage) return report(stage.error());
     stage_ = std::move(*stage);
-    Device device = openDevice(example_, FeatureComputeTracing);
+    // A driver's pipelines need none of its ray queries.
+    Device device = openDevice(example_, use_query_ ? FeatureComputeTracing : FeatureNone);
     if (!device) return report(device.error());
     use_query_ = use_query_ || needsQueries(example_, device, recursion);
 

@@ -21,9 +21,11 @@ Device openDevice(Example& example, FeatureMask required) {
     return device;
 }
 
-bool needsQueries(const Example& example, const Device& device, uint32_t recursion) {
+bool needsQueries(Example& example, const Device& device, uint32_t recursion) {
     const Features& features = device.getFeatures();
-    if (features.rayTracing && features.recursionDepth >= recursion) return false;
+    const bool has_pipelines = features.rayTracing && features.recursionDepth >= recursion;
+    example.statistics().tracing = toString(has_pipelines ? features.traversalEngine : features.tracingEngine);
+    if (has_pipelines) return false;
     std::fprintf(stderr, "%s: tracing by ray queries: '%s' has no ray-tracing pipelines whose traces nest %u deep\n",
                  example.name().c_str(), device.getInfo().name.c_str(), recursion);
     return true;

@@ -13,8 +13,8 @@
 glint::Device openDevice(Example& example, glint::FeatureMask required = glint::FeatureNone);
 
 /// For examples with two forms, a ray-tracing pipeline and ray queries: true, and said on stderr, if the device has no
-/// pipelines whose traces nest `recursion` deep.
-bool needsQueries(const Example& example, const glint::Device& device, uint32_t recursion);
+/// pipelines whose traces nest `recursion` deep. Notes the engine in the statistics.
+bool needsQueries(Example& example, const glint::Device& device, uint32_t recursion);
 
 /// Measures passes on the GPU for the statistics; does nothing on a device without time queries.
 class PassTimer {

@@ -112,6 +112,7 @@ nlohmann::ordered_json toJson(const Adapter& adapter) {
         return json;
     }
     json["tracing"] = info.tracing;
+    json["traversal"] = info.traversal;
     json["memory_bytes"] = adapter.features.videoMemory;
     json["timestamp_period_ns"] = adapter.features.timestampPeriod;
     for (const Limit& limit : limitsOf(adapter.features)) json["limits"][limit.name] = limit.value;
@@ -140,6 +141,7 @@ void print(const Adapter& adapter) {
         return;
     }
     fmt::print("  tracing    {}\n", info.tracing);
+    fmt::print("  traversal  {}\n", info.traversal);
     fmt::print("  memory     {:.1f} GiB\n", static_cast<double>(adapter.features.videoMemory) / (1ull << 30));
     fmt::print("  limits\n");
     for (const Limit& limit : limitsOf(adapter.features))

@@ -174,7 +174,7 @@ TEST(CourseGlass, AgreesWithFloat64) {
     const CameraParameters camera =
         CourseStage::camera(0.0f, static_cast<float>(width) / static_cast<float>(height)).parameters();
     const TempDir folder;
-    for (const char* form : {"", " --query"}) {
+    for (const char* form : {" --tracing driver", " --query"}) {
         const Expected<Image> picture = renderExample("26_procedural", std::string("--size 96x54") + form, folder);
         ASSERT_TRUE(picture);
         uint32_t glass = 0, deep = 0, edges = 0, wrong = 0;

@@ -38,7 +38,7 @@ void expectReference(const CourseCase& course, const std::filesystem::path& mesh
     const TempDir folder;
     std::string arguments = "--size 160x90 --time " + std::to_string(time) + course.arguments;
     if (!mesh.empty()) arguments += " --mesh '" + mesh.string() + "'";
-    const Expected<Image> pipeline = renderExample(course.program, arguments, folder);
+    const Expected<Image> pipeline = renderExample(course.program, arguments + " --tracing driver", folder);
     const Expected<Image> query = renderExample(course.program, arguments + " --query", folder);
     ASSERT_TRUE(pipeline && query);
     ASSERT_EQ(pipeline->width(), width);
@@ -112,7 +112,7 @@ TEST(Course, ReflectionsAreTheSameByQueries) {
     for (const char* depth : {" --depth 1", " --depth 4"}) {
         const TempDir folder;
         const std::string arguments = std::string("--size 160x90") + depth;
-        const Expected<Image> pipeline = renderExample("24_reflections", arguments, folder);
+        const Expected<Image> pipeline = renderExample("24_reflections", arguments + " --tracing driver", folder);
         const Expected<Image> query = renderExample("24_reflections", arguments + " --query", folder);
         ASSERT_TRUE(pipeline && query);
         EXPECT_TRUE(imagesMatch(*pipeline, *query, "24_reflections_query", {.texels = 25})) << depth;

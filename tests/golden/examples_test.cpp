@@ -107,9 +107,9 @@ TEST(Golden, DeformedTori) {
 TEST(Golden, TraversedTori) {
     const TempDir folder;
     const std::string at = "--size 160x90 --time 3";
-    const Expected<Image> pipeline = renderExample("06_hello_traversal", at, folder);
+    const Expected<Image> pipeline = renderExample("06_hello_traversal", at + " --tracing driver", folder);
     const Expected<Image> query = renderExample("06_hello_traversal", at + " --query", folder);
-    const Expected<Image> primary = renderExample("06_hello_traversal", at + " --primary", folder);
+    const Expected<Image> primary = renderExample("06_hello_traversal", at + " --primary --tracing driver", folder);
     const Expected<Image> primary_query = renderExample("06_hello_traversal", at + " --primary --query", folder);
     ASSERT_TRUE(pipeline && query && primary && primary_query);
     EXPECT_TRUE(matchesGolden(*pipeline, "06_hello_traversal", {.texels = 400}));
@@ -171,10 +171,10 @@ TEST(Golden, SplatsOfFiles) {
 }
 
 // The course: pixels of edges and of shadows' edges, a tenth of which float64 finds on either side
-// (course_reference_test.cpp has all of them one by one).
+// (course_reference_test.cpp has all of them one by one). engines_test.cpp has the pipelines that Glint joins.
 TEST(Golden, Course) {
     for (const char* name : {"20_normals", "21_diffuse", "22_phong", "23_shadows", "24_reflections"})
-        for (const char* form : {"", " --query"})
+        for (const char* form : {" --tracing driver", " --query"})
             expectGolden(name, std::string("--size 160x90") + form, name, {.texels = 15});
 }
 

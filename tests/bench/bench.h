@@ -79,6 +79,8 @@ Benchmark tracingLeaksBenchmark();
 Benchmark tracingTradeoffsBenchmark();
 Benchmark traversalOffsetBenchmark();
 Benchmark traversalHelloBenchmark();
+Benchmark traversalFirstBenchmark();
+Benchmark traversalWavefrontBenchmark();
 Benchmark parallelBenchmark();
 Benchmark parallelGpuBenchmark();
 Benchmark splatLoadBenchmark();

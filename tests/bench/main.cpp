@@ -67,6 +67,8 @@ int main(int argc, char** argv) {
                                     castBenchmark(),
                                     castMemoryBenchmark(),
                                     traversalHelloBenchmark(),
+                                    traversalFirstBenchmark(),
+                                    traversalWavefrontBenchmark(),
                                     traversalOffsetBenchmark(),
                                     parallelBenchmark(),
                                     parallelGpuBenchmark(),

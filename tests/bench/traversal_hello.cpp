@@ -1,21 +1,16 @@
-// traversal.hello.{pipeline,query,embree}_{ms,mrays}: a frame of 06_hello_traversal at 1600 x 900, through the driver's
-// ray-tracing pipeline and by ray queries, as the example itself measures them, and the same rays through Embree, one
-// at a time on all processors. Each the best of some turns; on processors by processor time over the number of them.
+// traversal.hello.*: a frame of 06_hello_traversal at 1600 x 900, as the example itself measures it: through the
+// driver's ray-tracing pipeline, through its stages joined for the software engine, and by ray queries of that; and the
+// same rays through Embree, one at a time on all processors. Each the best of some turns; on processors by processor
+// time over the number of them. Embree shades nothing.
 
 #include "06_hello_traversal/scene.h"
 #include "accuracy/embree.h"
+#include "bench/example_runs.h"
 #include "bench/tracing_batch.h"
-#include "support/files.h"
-
-#include <glint/base/file.h>
 
 #include <fmt/format.h>
-#include <nlohmann/json.hpp>
-
-#include <sys/resource.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <limits>
 #include <thread>
 
@@ -24,45 +19,21 @@ namespace glint::bench {
 namespace {
 
 constexpr uint32_t width = 1600, height = 900, tile = 4;
-constexpr uint32_t turns = 2, gpu_frames = 100, cpu_frames = 2;
+constexpr uint32_t turns = 2, gpu_frames = 400, cpu_frames = 2;
 constexpr float nearest = 1e-3f, farthest = 1000.0f;
-
-/// Seconds that the programs started so far have spent on processors.
-double childSeconds() {
-    rusage usage = {};
-    getrusage(RUSAGE_CHILDREN, &usage);
-    const auto seconds = [](const timeval& time) {
-        return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
-    };
-    return seconds(usage.ru_utime) + seconds(usage.ru_stime);
-}
-
-struct ExampleTimes {
-    double device = 0.0;  ///< milliseconds of the fastest frame
-    double process = 0.0;
-};
-
-ExampleTimes runExample(const std::string& arguments, uint32_t frames, const test::TempDir& folder) {
-    const std::filesystem::path programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-    const std::filesystem::path example = programs.parent_path() / "examples" / "06_hello_traversal";
-    if (!std::filesystem::exists(example)) throw std::runtime_error(example.string() + " has not been built");
-    const std::string stats = folder / "stats.json";
-    const std::string command =
-        fmt::format("'{}' --size {}x{} --time 0 --frames {} --stats '{}' {} > '{}'", example.string(), width, height,
-                    frames, stats, arguments, (folder / "output").string());
-    const double begin = childSeconds();
-    if (std::system(command.c_str()) != 0) throw std::runtime_error("failed: " + command);
-    const double seconds = childSeconds() - begin;
-    const auto json = nlohmann::json::parse(check(readTextFile(stats)).value());
-    return {json.at("passes").at(0).at("min_ns").get<double>() * 1e-6, seconds};
-}
 
 /// Milliseconds of a frame: by the device's clock, or, where the device is the processor, by the processor time of
 /// frames after the first, so that what other programs do is left out.
-double traceExample(const std::string& arguments, const Device& device, uint32_t threads, const test::TempDir& folder) {
-    if (!device.getInfo().cpu) return runExample(arguments, gpu_frames, folder).device;
-    const double first = runExample(arguments, 1, folder).process;
-    return (runExample(arguments, 1 + cpu_frames, folder).process - first) * 1e3 / (cpu_frames * threads);
+double traceExample(const TraversalEngine& engine, const Device& device, uint32_t threads) {
+    const auto run = [&](uint32_t frames) {
+        const std::string arguments =
+            fmt::format("--size {}x{} --time 0 --frames {} {}", width, height, frames, engine.arguments);
+        return runExample("06_hello_traversal", arguments, engine.environment);
+    };
+    // Several hundred, as clocks rise under load alone.
+    if (!device.getInfo().cpu) return run(gpu_frames).trace_ms;
+    const double first = run(1).processor;
+    return (run(1 + cpu_frames).processor - first) * 1e3 / (cpu_frames * threads);
 }
 
 struct RaySets {
@@ -119,12 +90,18 @@ void run(Report& report) {
     std::vector<uint8_t> shadows(rays.shadow.size());
 
     const Device device = createDevice();
-    const test::TempDir folder;
+    const bool has_pipelines = device.getFeatures().rayTracing;
+    const TraversalEngine driver = driverTraversal(device), software = softwareTraversal();
+    const TraversalEngine queries = {"query", "--query --tracing software", ""};
+    // What is compiled stays in the driver's cache.
+    for (const TraversalEngine& engine : {software, queries})
+        runExample("06_hello_traversal", "--size 16x16 " + engine.arguments, engine.environment);
     constexpr double never = std::numeric_limits<double>::infinity();
-    double pipeline = never, query = never, theirs = never;
+    double pipeline = never, joined = never, query = never, theirs = never;
     for (uint32_t turn = 0; turn < turns; turn++) {
-        if (device.getFeatures().rayTracing) pipeline = std::min(pipeline, traceExample("", device, threads, folder));
-        query = std::min(query, traceExample("--query", device, threads, folder));
+        if (has_pipelines) pipeline = std::min(pipeline, traceExample(driver, device, threads));
+        joined = std::min(joined, traceExample(software, device, threads));
+        query = std::min(query, traceExample(queries, device, threads));
         const double begin = processSeconds();
         embree.cast(rays.primary, hits, threads);
         embree.cast(rays.reflection, hits, threads);
@@ -133,28 +110,40 @@ void run(Report& report) {
     }
     const std::string against =
         fmt::format("{} single rays on {} threads, {}", test::embreeName(), threads, processorName());
-    const auto add = [&](const char* side, double ms, const std::string& other, const std::string& where) {
+    const std::string where = deviceName(device);
+    const auto add = [&](const char* side, double ms, const std::string& other, const std::string& which) {
         if (ms == never) {
             fmt::print("  {} left out: {} has no ray-tracing pipelines\n", side, device.getInfo().name);
             return;
         }
         const double mrays = static_cast<double>(rays.count()) * 1e-3 / ms;
         fmt::print("  {:<9} {:9.2f} ms, {:8.2f} million rays a second\n", side, ms, mrays);
-        report.add(fmt::format("traversal.hello.{}_ms", side), ms, "ms", other, where);
-        report.add(fmt::format("traversal.hello.{}_mrays", side), mrays, "million rays a second", other, where);
+        report.add(fmt::format("traversal.hello.{}_ms", side), ms, "ms", other, which);
+        report.add(fmt::format("traversal.hello.{}_mrays", side), mrays, "million rays a second", other, which);
     };
     fmt::print("  {} rays: {} of the camera, {} reflections, {} shadows\n", rays.count(), rays.primary.size(),
                rays.reflection.size(), rays.shadow.size());
-    add("pipeline", pipeline, against, deviceName(device));
-    add("query", query, against, deviceName(device));
+    add("pipeline", pipeline, against, where);
+    add("joined", joined, against, where);
+    add("query", query, against, where);
     add("embree", theirs, "", processorName());
+    report.add("traversal.hello.software_over_embree1", theirs / joined, "ratio of speeds", against, where);
+    report.add("traversal.hello.query_over_embree1", theirs / query, "ratio of speeds", against, where);
+    if (!has_pipelines) return;
+    report.add("traversal.hello.driver_over_embree1", theirs / pipeline, "ratio of speeds", against, where);
+    report.add(device.getInfo().cpu ? "traversal.hello.software_over_driver"
+                                    : "traversal.gpu.hello.software_over_driver",
+               pipeline / joined, "ratio of speeds", "the driver's pipeline", where);
 }
 
 }  // namespace
 
 Benchmark traversalHelloBenchmark() {
-    Benchmark benchmark = {{}, run};
-    for (const char* side : {"pipeline", "query", "embree"})
+    Benchmark benchmark = {{"traversal.hello.software_over_embree1", "traversal.hello.query_over_embree1",
+                            "traversal.hello.driver_over_embree1", "traversal.hello.software_over_driver",
+                            "traversal.gpu.hello.software_over_driver"},
+                           run};
+    for (const char* side : {"pipeline", "joined", "query", "embree"})
         for (const char* unit : {"ms", "mrays"})
             benchmark.figures.push_back(fmt::format("traversal.hello.{}_{}", side, unit));
     return benchmark;

@@ -142,6 +142,16 @@ Status TraversalObject::check(const Stages& stages, Where where) const {
     if (constexpr uint32_t limit = Traversal::max_callable_depth; callable_depth > limit)
         return problem(where, ErrorCode::Unsupported, "traversal.callable_depth",
                        fmt::format("callable depth {}, the limit is {}", callable_depth, limit));
+    if (device()->joinsTraversals()) {
+        // Two sets of Glint's own follow: the joined kernel's blocks, and the software engine's.
+        const TracingHeap* const heap = device()->heap();
+        const uint32_t most = (heap ? heap->rewrite().set : device()->features().maxSets) - 1;
+        if (layout.set_count > most)
+            return problem(where, ErrorCode::OutOfRange, "traversal.set",
+                           fmt::format("its shaders have resources in set {}, where pipelines are joined the highest "
+                                       "is {}",
+                                       layout.set_count - 1, most - 1));
+    }
     if (Error error = checkRecords(stages, where)) return error;
     if (Error error = checkVariables(stages, where)) return error;
     return {};

@@ -132,7 +132,7 @@ OpFunctionEnd
                                                  "writing.spvasm");
     EXPECT_THAT(shader, HasErrorId("shader.validate"));
     EXPECT_EQ(shader.error().file(), "writing.spvasm");
-    EXPECT_EQ(shader.error().line(), 20u);
+    EXPECT_EQ(shader.error().line(), 19u);
     EXPECT_THAT(shader.error().message(), testing::HasSubstr("read only"));
 }
 
@@ -163,6 +163,23 @@ TEST_F(TraversalRefusals, OtherModesThanThoseOfTheOthers) {
     expectRefused(Shader::createAssembly(Shader::TypeRayMiss,
                                          assembly("OpCapability VulkanMemoryModel\n", "Vulkan", ""), "model.spvasm"),
                   "the RayMiss shader 'model.spvasm'", "", "memory model");
+}
+
+TEST_F(TraversalRefusals, SetsOfGlintsOwn) {
+    const auto create = [&](const char* set) {
+        Traversal traversal = device.createTraversal("refused");
+        traversal.setShader(Shader::createGLSL(Shader::TypeRayGen, R"(
+layout(set = SET, binding = 0, std430) writeonly buffer Results { uint results[]; };
+void main() { results[gl_LaunchIDEXT.x] = 1u; }
+)",
+                                               std::string("SET=") + set));
+        return traversal.create();
+    };
+    EXPECT_THAT(create("5"), IsOk());
+    const Status created = create("6");
+    EXPECT_THAT(created, HasErrorId("traversal.set"));
+    EXPECT_THAT(created.error().message(), testing::HasSubstr("set 6"));
+    EXPECT_THAT(created.error().message(), testing::HasSubstr("is 5"));
 }
 
 TEST_F(TraversalRefusals, TooManyWordsAndLevels) {

@@ -41,10 +41,12 @@ bool FlowBlock::isLoop() const { return merge.opcode == spv::OpLoopMerge; }
 StructuredFlow::StructuredFlow(const Instructions& function, const std::function<uint32_t()>& new_id) {
     std::unordered_map<uint32_t, uint32_t> last_parts;
     uint32_t label = 0;
+    size_t begin = 0;
     for (const Instruction& item : function) {
         if (item.opcode == spv::OpFunction || item.opcode == spv::OpFunctionEnd) continue;
         if (item.opcode == spv::OpLabel) {
             label = item.result();
+            begin = blocks.size();
             blocks.emplace_back().label = label;
             continue;
         }
@@ -55,7 +57,10 @@ StructuredFlow::StructuredFlow(const Instructions& function, const std::function
         FlowBlock& block = blocks.back();
         if (item.opcode == spv::OpPhi) {
             block.phis.push_back(item);
-        } else if (item.opcode == spv::OpSelectionMerge || item.opcode == spv::OpLoopMerge) {
+        } else if (item.opcode == spv::OpLoopMerge) {
+            // What turns come back to is the first part.
+            blocks[begin].merge = item;
+        } else if (item.opcode == spv::OpSelectionMerge) {
             block.merge = item;
         } else if (endsBlock(item.opcode)) {
             block.end = item;

@@ -212,6 +212,9 @@ Status ProgramObject::build(Where where) {
             element_count += resource.descriptorCount();
             if (resource.descriptor == SlotKind::Uniform) uniform_elements += resource.descriptorCount();
         }
+    // It may run before any structure is built.
+    if (!layout.hidden.empty())
+        if (const auto memory = device()->heap()->allocate(1, where); !memory) return memory.error();
     Expected<std::unique_ptr<Native>> made = createNative(*stages, where);
     if (!made) return made.error();
     native = std::move(*made);

@@ -178,6 +178,26 @@ TEST_P(TracingEngineTest, AHeapHasAnEnd) {
     EXPECT_THAT(told[0].error.message(), testing::HasSubstr("the limit is"));
 }
 
+TEST_P(TracingEngineTest, ProgramsThatMayTraceRunBeforeAnythingIsBuilt) {
+    std::string text = source;
+    text.replace(text.find("uniform accelerationStructureEXT scene;"), 39, "uniform Where { uvec2 scene; };");
+    text.replace(text.find("query, scene"), 12, "query, accelerationStructureEXT(scene)");
+    text.replace(text.find("rayQueryEXT query;"), 18,
+                 "distances[i] = -2.0; if (scene == uvec2(0u)) return; rayQueryEXT query;");
+    Kernel careful = device.createKernel("careful");
+    careful.createShaderGLSL(text.c_str());
+    ASSERT_THAT(careful.create(), IsOk());
+    Compute compute = device.createCompute();
+    compute.setKernel(careful);
+    compute.setUniform(0, std::array<uint32_t, 4>{});
+    compute.setStorageBuffer(0, distances);
+    compute.dispatch(rays);
+    ASSERT_THAT(device.submit(compute), IsOk());
+    const Expected<std::vector<float>> found = device.read<float>(distances);
+    ASSERT_TRUE(found);
+    if (GetParam() != "null") { EXPECT_EQ(*found, std::vector<float>(rays, -2.0f)); }
+}
+
 INSTANTIATE_TEST_SUITE_P(Apis, TracingEngineTest, testing::Values("null", "vulkan"),
                          [](const auto& test) { return test.param; });
 

@@ -97,9 +97,6 @@ Status TraversalObject::join(const Stages& stages, Where where) {
     kernel->joined_resources = layout.resources;
     kernel->shaders.emplace_back(static_cast<ShaderObject*>(shader.object()));
     if (Status status = kernel->create(where); !status) return status;
-    // Also a pipeline that traces nothing reads the heap, as far as anybody can tell: there has to be one.
-    if (!kernel->layout.hidden.empty())
-        if (auto any = device()->heap()->allocate(1, where); !any) return any.error();
     // What is reloaded has the same records.
     if (Status status = joined_records ? Status() : createJoinedBuffers(where); !status) return status;
     joined = std::move(kernel);

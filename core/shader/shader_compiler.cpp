@@ -25,7 +25,8 @@ Hash toolHash() {
 /// Of everything that decides the result: the texts hold the includes and the macros.
 Hash makeKey(const ShaderSource& source, std::string_view text, std::span<const uint32_t> words,
              std::string_view library) {
-    const std::array<uint8_t, 2> kind = {static_cast<uint8_t>(source.language), static_cast<uint8_t>(source.stage)};
+    const std::array<uint8_t, 3> kind = {static_cast<uint8_t>(source.language), static_cast<uint8_t>(source.stage),
+                                         source.optimize};
     Hash key = hashBytes(kind.data(), kind.size(), toolHash());
     key = hashText(source.entry, key);
     key = hashText(text, key);
@@ -47,9 +48,10 @@ Expected<CompiledShader> finish(const ShaderSource& source, std::vector<uint32_t
     }
     CompiledShader result;
     result.reflection = std::move(*reflection);
-    Expected<std::vector<uint32_t>> optimized = shader::optimizeValid(source, words);
+    Expected<std::vector<uint32_t>> optimized;
+    if (source.optimize) optimized = shader::optimizeValid(source, words);
     if (!optimized) shader::logWarning(optimized.error());
-    result.words = optimized ? std::move(*optimized) : std::move(words);
+    result.words = source.optimize && optimized ? std::move(*optimized) : std::move(words);
     return result;
 }
 

@@ -33,6 +33,7 @@ struct ShaderSource {
     std::vector<std::filesystem::path> include_paths;  ///< beside the folder of the including file and the SDK's own
     std::string entry = "main";
     TracingRewrite tracing;
+    bool optimize = true;  ///< by SPIRV-Tools; a module made of optimised ones is left to the driver
 };
 
 /// When a file was last written and how long it is: enough to notice a change without reading it.
@@ -51,7 +52,7 @@ bool filesChanged(std::span<const FileStamp> stamps);
 
 /// A shader that has passed all steps.
 struct CompiledShader {
-    std::vector<uint32_t> words;               ///< optimised SPIR-V, names kept
+    std::vector<uint32_t> words;               ///< SPIR-V, optimised unless asked otherwise, names kept
     Reflection reflection;                     ///< read before the optimiser removed anything
     std::vector<std::filesystem::path> files;  ///< every file that went in, for reloading
     std::vector<FileStamp> stamps;             ///< the same files as they were when read, for filesChanged

@@ -227,6 +227,38 @@ void main() {
     EXPECT_THAT(join({{ShaderStage::RayGen, rays}, {ShaderStage::RayMiss, miss}}, 1, true), IsOk());
 }
 
+TEST_F(TraversalJoinText, StructuresOfManyPlaces) {
+    const std::string rays = R"(
+layout(binding = 0) uniform accelerationStructureEXT scenes[4];
+layout(binding = 1) uniform accelerationStructureEXT table[];
+layout(push_constant) uniform Push { uvec2 address; uint64_t wide; };
+layout(location = 0) rayPayloadEXT vec4 data;
+void look(accelerationStructureEXT scene) {
+    traceRayEXT(scene, 0u, 0xff, 0, 1, 0, vec3(0.0), 0.0, vec3(0.0, 0.0, -1.0), 100.0, 0);
+}
+void main() {
+    look(scenes[gl_LaunchIDEXT.x & 3u]);
+    for (uint i = 0u; i < 3u; i++) look(table[nonuniformEXT(i + gl_LaunchIDEXT.x)]);
+    traceRayEXT(accelerationStructureEXT(address), 0u, 0xff, 0, 1, 0, vec3(0.0), 0.0, vec3(1.0), 100.0, 0);
+    traceRayEXT(accelerationStructureEXT(wide), 0u, 0xff, 0, 1, 0, vec3(0.0), 0.0, vec3(1.0), 100.0, 0);
+}
+)";
+    for (const bool optimized : {false, true}) {
+        const Expected<Words> joined =
+            join({{ShaderStage::RayGen, rays}, {ShaderStage::Closest, closest}}, 2, optimized);
+        ASSERT_THAT(joined, IsOk());
+        // Both arrays, addresses, and the lone one.
+        EXPECT_EQ(countInstructions(*joined, spv::OpRayQueryInitializeKHR), 4u);
+        EXPECT_EQ(countInstructions(*joined, spv::OpRayQueryProceedKHR), 1u);
+        ShaderSource source = binary(*joined);
+        source.tracing.library = "glint/tracing/query.h";
+        source.tracing.set = 8;
+        Expected<Reflection> reflection = reflect(*joined);
+        ASSERT_THAT(reflection, IsOk());
+        EXPECT_THAT(shader::rewriteRayQueries(source, *joined, *reflection), IsOk());
+    }
+}
+
 TEST_F(TraversalJoinText, QueriesWithinStages) {
     const std::string asking = incoming("layout(binding = 0) uniform accelerationStructureEXT scene;\n",
                                         "rayQueryEXT query; rayQueryInitializeEXT(query, scene, 0u, 0xff, vec3(0.0), "

@@ -181,6 +181,37 @@ void main() {
     });
 }
 
+TEST_F(TraversalResume, RaysChooseTheirStructures) {
+    const std::string generation = R"(
+layout(binding = 0) uniform accelerationStructureEXT scene;
+layout(binding = 2) uniform accelerationStructureEXT other;
+layout(binding = 1, std430) writeonly buffer Results { uint results[]; };
+layout(location = 1) rayPayloadEXT uvec2 payload;
+void main() {
+    uint x = gl_LaunchIDEXT.x;
+    payload = uvec2(x, 0u);
+    vec3 origin = vec3(float(x % 5u) + 0.5, 0.25, 10.0), down = vec3(0.0, 0.0, -1.0);
+    for (uint i = 0u; i < 3u; i++) {
+        if ((x + i) % 3u == 2u)
+            traceRayEXT(other, 0u, 0xff, 0, 1, 0, origin, 0.0, down, 100.0, 1);
+        else
+            traceRayEXT(scene, 0u, 0xff, 0, 1, 0, origin, 0.0, down, 100.0, 1);
+    }
+    results[x] = payload.x;
+}
+)";
+    const std::string simple = "layout(location = 0) rayPayloadInEXT uvec2 data;\nvoid main() { data.x = ";
+    const Pipe pipe = {.shaders = {{Shader::TypeRayGen, generation, {}},
+                                   {Shader::TypeRayMiss, simple + "data.x * 5u + 1u; }\n", {}},
+                                   {Shader::TypeClosest, simple + "data.x * 7u + uint(gl_HitTEXT); }\n", {}},
+                                   {Shader::TypeClosest, simple + "data.x * 3u + uint(gl_HitTEXT); }\n", {}}}};
+    const Tracing far = makeTop({place(square_, 0, -9), place(square_, 4, -5, 1)});
+    run(pipe, rays, rays, [&](Compute& list) {
+        list.setTracing(0, scene_);
+        list.setTracing(1, far);
+    });
+}
+
 // GLINT_STAGES sets how many there are, GLINT_STAGE the first.
 TEST_F(TraversalResume, RandomStages) {
     const char* const first = std::getenv("GLINT_STAGE");

@@ -17,6 +17,9 @@ std::optional<CompiledShader> decodeShader(std::span<const std::byte> bytes);
 /// The folder that is used unless setShaderCache names another, as the environment says now.
 std::filesystem::path defaultCacheFolder();
 
+/// What every key begins with: the versions of the compilers and of what is done with their results.
+Hash toolHash();
+
 /// Takes an entry from the cache and marks it as used. A damaged one counts as absent.
 std::optional<CompiledShader> loadFromCache(const Hash& key);
 

@@ -13,7 +13,9 @@ namespace {
 /// Raised with any change of what the steps make of the same text, or of what an entry holds.
 constexpr uint32_t cache_version = 5;
 
-Hash toolHash() {
+}  // namespace
+
+Hash shader::toolHash() {
     static const Hash hash = [] {
         const glslang::Version version = glslang::GetVersion();
         return hashText(fmt::format("{} glslang {}.{}.{} {}", cache_version, version.major, version.minor,
@@ -22,12 +24,14 @@ Hash toolHash() {
     return hash;
 }
 
+namespace {
+
 /// Of everything that decides the result: the texts hold the includes and the macros.
 Hash makeKey(const ShaderSource& source, std::string_view text, std::span<const uint32_t> words,
              std::string_view library) {
     const std::array<uint8_t, 3> kind = {static_cast<uint8_t>(source.language), static_cast<uint8_t>(source.stage),
                                          source.optimize};
-    Hash key = hashBytes(kind.data(), kind.size(), toolHash());
+    Hash key = hashBytes(kind.data(), kind.size(), shader::toolHash());
     key = hashText(source.entry, key);
     key = hashText(text, key);
     if (!library.empty()) key = hashText(fmt::format("{} {}", source.tracing.set, library), key);

@@ -1,5 +1,6 @@
 #include "traversal_joiner.h"
 
+#include "shader_cache.h"
 #include "shader_source.h"
 #include "traversal_linker.h"
 #include "traversal_skeleton.h"
@@ -37,6 +38,20 @@ Expected<SpirvModule> stageModule(const TraversalSource::Stage& stage) {
     return SpirvModule::parse(*fixed);
 }
 
+/// From the cache if it is there: a compiler of GLSL takes longer to start than all the rest does.
+Expected<std::vector<uint32_t>> skeletonWords(const ShaderSource& skeleton) {
+    const Expected<Preprocessed> text = preprocess(skeleton);
+    if (!text) return unexpected(text.error());
+    const Hash key = hashText(text->text, hashText("skeleton", toolHash()));
+    if (std::optional<CompiledShader> known = loadFromCache(key)) return std::move(known->words);
+    Expected<std::vector<uint32_t>> words = compileLibrary(skeleton, *text, version_1_4);
+    if (!words) return words;
+    CompiledShader made;
+    made.words = *words;
+    storeInCache(key, made);
+    return words;
+}
+
 }  // namespace
 
 Expected<std::vector<uint32_t>> joinTraversal(const TraversalSource& source) {
@@ -47,10 +62,7 @@ Expected<std::vector<uint32_t>> joinTraversal(const TraversalSource& source) {
         modules.push_back(std::move(*module));
     }
     const auto makeSkeleton = [&](const SkeletonNeeds& needs) -> Expected<SpirvModule> {
-        const ShaderSource skeleton = skeletonSource(source, needs);
-        const Expected<Preprocessed> preprocessed = preprocess(skeleton);
-        if (!preprocessed) return unexpected(preprocessed.error());
-        Expected<std::vector<uint32_t>> words = compileLibrary(skeleton, *preprocessed, version_1_4);
+        Expected<std::vector<uint32_t>> words = skeletonWords(skeletonSource(source, needs));
         if (!words) return unexpected(words.error());
         return SpirvModule::parse(*words);
     };

@@ -4,8 +4,6 @@
 #include "unit/random_stage.h"
 #include "unit/traversal_join_gpu.h"
 
-#include <cstdlib>
-
 namespace glint::test {
 
 namespace {
@@ -89,16 +87,28 @@ protected:
         compare(body, body, 1);
     }
 
+    /// Pipelines of random stages, from this seed on.
+    void compareRandom(uint32_t begin, uint32_t count) {
+        for (uint32_t seed = begin; seed < begin + count; seed++) {
+            RandomStage generation(2 * seed), nested(2 * seed + 1);
+            const std::string above = generation.statements(3, 2), below = nested.statements(3, 2);
+            SCOPED_TRACE(fmt::format("seed {}\n{}\nbelow\n{}", seed, above, below));
+            compare(above, below, seed % 3, seed % 4 == 3, seed % 2 == 0);
+            if (HasFailure()) return;
+        }
+    }
+
     Tracing square_, scene_;
 };
+using TraversalResumeLong = TraversalResume;
 
-TEST_F(TraversalResume, Branches) {
+TEST_F(TraversalResumeLong, Branches) {
     compareBoth("if ((a & 1u) == 0u) { b = look(a); } else { c = b; if (c > 9u) d = look(c) + 1u; c++; }\nd += c;\n"
                 "if (a % 3u == 0u && look(b) % 2u == 0u) c = look(d);\n"
                 "t[a % 3u] = look(c) + t[2];\n");
 }
 
-TEST_F(TraversalResume, LoopsWithBreaksAndContinues) {
+TEST_F(TraversalResumeLong, LoopsWithBreaksAndContinues) {
     compareBoth("for (uint i = 0u; i < 4u; i++) {\n"
                 "    if ((a + i) % 5u == 1u) continue;\n"
                 "    for (uint k = 0u; k < 3u; k++) { b += look(b + k); if (b % 4u == i) break; t[k] += i; }\n"
@@ -116,11 +126,11 @@ TEST_F(TraversalResume, SwitchesThatFallThrough) {
                 "case 3u: d += look(d); continue;\ndefault: c = look(c) * 3u;\n}\n");
 }
 
-TEST_F(TraversalResume, Functions) {
+TEST_F(TraversalResumeLong, Functions) {
     compareBoth("a = twice(a, b);\nc = twice(c, d) + look(a);\nif (twice(t[0], a) % 2u == 0u) return;\nd = look(b);\n");
 }
 
-TEST_F(TraversalResume, FiveRaysAndOnesThatMiss) {
+TEST_F(TraversalResumeLong, FiveRaysAndOnesThatMiss) {
     const char* const five = "for (uint i = 0u; i < 5u; i++) { a += look(a + i); t[i % 3u] += a; }\n";
     compare("a = look(a);\n", five, 1);
     compare("a = look(a);\n", "b = look(a * 2u) + look(b);\n", 3, true);
@@ -212,19 +222,9 @@ void main() {
     });
 }
 
-// GLINT_STAGES sets how many there are, GLINT_STAGE the first.
-TEST_F(TraversalResume, RandomStages) {
-    const char* const first = std::getenv("GLINT_STAGE");
-    const char* const count = std::getenv("GLINT_STAGES");
-    const uint32_t begin = first ? static_cast<uint32_t>(std::atoi(first)) : 0;
-    const uint32_t end = begin + (count ? static_cast<uint32_t>(std::atoi(count)) : 2);
-    for (uint32_t seed = begin; seed < end; seed++) {
-        RandomStage generation(2 * seed), nested(2 * seed + 1);
-        const std::string above = generation.statements(3, 2), below = nested.statements(3, 2);
-        SCOPED_TRACE(fmt::format("seed {}\n{}\nbelow\n{}", seed, above, below));
-        compare(above, below, seed % 3, seed % 4 == 3, seed % 2 == 0);
-        if (HasFailure()) return;
-    }
-}
+TEST_F(TraversalResume, RandomStages) { compareRandom(1, 1); }
+
+// From seed 41 lavapipe's own pipeline makes LLVM 15 abort ("Cannot emit physreg copy instruction").
+TEST_F(TraversalResumeLong, RandomStages) { compareRandom(2, 30); }
 
 }  // namespace glint::test

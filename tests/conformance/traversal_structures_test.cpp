@@ -2,6 +2,7 @@
 
 #include "conformance/traversal_scene.h"
 
+#include <glint/device/detail/object.h>
 #include <glint/geometry/primitives.h>
 
 namespace glint::test {
@@ -27,18 +28,20 @@ const char* const hit_distance = "uint(gl_HitTEXT * 4.0)";
 
 class TraversalStructures : public TraversalTest {
 protected:
-    /// Quarters of a distance, or 1.
+    /// Quarters of a distance, or 1. Once for a test's device: some take seconds to compile.
     Traversal makeDistances() {
-        return makeTraversal({{Shader::TypeRayGen, look_down, {}},
-                              {Shader::TypeRayMiss, setPayload("1u"), {}},
-                              {Shader::TypeClosest, setPayload(hit_distance), {}}});
+        if (!distances_ || distances_.object()->device() != device.object())
+            distances_ = makeTraversal({{Shader::TypeRayGen, look_down, {}},
+                                        {Shader::TypeRayMiss, setPayload("1u"), {}},
+                                        {Shader::TypeClosest, setPayload(hit_distance), {}}});
+        return distances_;
     }
 
     Words queryDown(const Tracing& scene, size_t count) {
         const Buffer results = makeBuffer(Words(count, 0xdeadu));
-        const Kernel kernel = makeKernel(query_down);
+        if (!query_ || query_.object()->device() != device.object()) query_ = makeKernel(query_down);
         compute([&](Compute& list) {
-            list.setKernel(kernel);
+            list.setKernel(query_);
             list.setTracing(0, scene);
             list.setStorageBuffer(0, results);
             list.dispatch(count);
@@ -67,6 +70,10 @@ protected:
         const Features& features = device.getFeatures();
         return features.traversalEngine == TracingEngine::Driver && features.tracingEngine == TracingEngine::Software;
     }
+
+private:
+    Traversal distances_;
+    Kernel query_;
 };
 
 }  // namespace

@@ -22,7 +22,7 @@ struct EngineCase {
 
 void PrintTo(const EngineCase& item, std::ostream* stream) { *stream << item.name; }
 
-class EnginesLong : public ::testing::TestWithParam<EngineCase> {};
+class Engines : public ::testing::TestWithParam<EngineCase> {};
 
 }  // namespace
 
@@ -31,7 +31,7 @@ class EnginesLong : public ::testing::TestWithParam<EngineCase> {};
 // quarter to a half is allowed: half a pixel in a hundred, and twice that where glass or mirrors multiply what rounding
 // moves a ray by, as between pipelines and queries (course_light_test.cpp). A pixel differs if a channel is off by more
 // than a step of 8 bits and the half that rounding to them may add.
-TEST_P(EnginesLong, Agree) {
+TEST_P(Engines, Agree) {
     const EngineCase& item = GetParam();
     const TempDir folder;
     const Expected<Image> driver =
@@ -46,7 +46,7 @@ TEST_P(EnginesLong, Agree) {
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Examples, EnginesLong,
+    Examples, Engines,
     ::testing::Values(
         EngineCase{"06", "06_hello_traversal", "--size 160x90 --time 3", 72},
         EngineCase{"06_primary", "06_hello_traversal", "--size 160x90 --time 3 --primary", 72},

@@ -2,7 +2,6 @@
 
 #include "conformance/traversal_scene.h"
 
-#include <glint/device/detail/object.h>
 #include <glint/geometry/primitives.h>
 
 namespace glint::test {
@@ -28,9 +27,9 @@ const char* const hit_distance = "uint(gl_HitTEXT * 4.0)";
 
 class TraversalStructures : public TraversalTest {
 protected:
-    /// Quarters of a distance, or 1. Once for a test's device: some take seconds to compile.
+    /// Quarters of a distance, or 1. Made once for a test: it may take seconds to compile.
     Traversal makeDistances() {
-        if (!distances_ || distances_.object()->device() != device.object())
+        if (!distances_)
             distances_ = makeTraversal({{Shader::TypeRayGen, look_down, {}},
                                         {Shader::TypeRayMiss, setPayload("1u"), {}},
                                         {Shader::TypeClosest, setPayload(hit_distance), {}}});
@@ -39,7 +38,7 @@ protected:
 
     Words queryDown(const Tracing& scene, size_t count) {
         const Buffer results = makeBuffer(Words(count, 0xdeadu));
-        if (!query_ || query_.object()->device() != device.object()) query_ = makeKernel(query_down);
+        if (!query_) query_ = makeKernel(query_down);
         compute([&](Compute& list) {
             list.setKernel(query_);
             list.setTracing(0, scene);

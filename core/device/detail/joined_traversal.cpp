@@ -20,9 +20,12 @@ constexpr std::array<uint32_t, 3> joinedGroupSize(bool is_cpu) {
     return is_cpu ? std::array<uint32_t, 3>{32, 2, 1} : std::array<uint32_t, 3>{8, 8, 1};
 }
 
-/// The refusal once more, of stages that know their lines: compiled anew where they are GLSL.
-Error refusal(shader::TraversalSource source, const ProgramObject::Stages& stages, const Error& first) {
-    if (first.code() != ErrorCode::Unsupported) return first;
+/// Joins stages; those that are refused once more as they were before optimisation, where they are GLSL. Optimisers
+/// move what may stand in few places, such as the end of a shader, and a module fresh from the compiler knows its
+/// lines.
+Expected<std::vector<uint32_t>> joinStages(shader::TraversalSource source, const ProgramObject::Stages& stages) {
+    Expected<std::vector<uint32_t>> joined = shader::joinTraversal(source);
+    if (joined || joined.error().code() != ErrorCode::Unsupported) return joined;
     std::deque<std::vector<uint32_t>> modules;
     for (size_t i = 0; i < stages.shaders.size(); i++) {
         const ShaderSource& text = stages.shaders[i]->source;
@@ -34,8 +37,8 @@ Error refusal(shader::TraversalSource source, const ProgramObject::Stages& stage
         source.stages[i].words = modules.emplace_back(std::move(*words));
         source.stages[i].entry = text.entry;
     }
-    const Expected<std::vector<uint32_t>> again = shader::joinTraversal(source);
-    return !again && again.error().id() == first.id() ? again.error() : first;
+    if (modules.empty()) return joined;
+    return shader::joinTraversal(source);
 }
 
 }  // namespace
@@ -87,8 +90,8 @@ Status TraversalObject::join(const Stages& stages, Where where) {
     for (size_t t = 0; t < ray_tables; t++)
         for (const TraversalDesc::Group& group : groups[t])
             source.groups[t].push_back({group.general, group.closest, group.first_hit, group.intersection});
-    Expected<std::vector<uint32_t>> words = shader::joinTraversal(source);
-    if (!words) return refusal(std::move(source), stages, words.error()).at(where).named(name());
+    const Expected<std::vector<uint32_t>> words = joinStages(std::move(source), stages);
+    if (!words) return words.error().at(where).named(name());
 
     auto shader = Ref<ShaderObject>::adopt(new ShaderObject);
     shader->setName(name());

@@ -45,10 +45,6 @@ ExampleRun runExample(std::string_view name, const std::string& arguments, const
     return run;
 }
 
-TraversalEngine driverTraversal(const Device& device) {
-    return {"driver", device.getInfo().cpu ? "--tracing driver" : "--tracing auto", ""};
-}
-
-TraversalEngine softwareTraversal() { return {"software", "--tracing software", "GLINT_TRAVERSAL=software"}; }
+const char* driverTracing(const Device& device) { return device.getInfo().cpu ? "--tracing driver" : "--tracing auto"; }
 
 }  // namespace glint::bench

@@ -19,14 +19,8 @@ struct ExampleRun {
 /// if it has not been built or fails.
 ExampleRun runExample(std::string_view name, const std::string& arguments, const std::string& environment = {});
 
-/// Who answers a Traversal, as arguments and environment of an example. The software engine joins its stages; where the
-/// device is no CPU, the driver's pipelines are what is chosen by default, also beside ray queries by the engine.
-struct TraversalEngine {
-    const char* name;
-    std::string arguments;
-    std::string environment;
-};
-TraversalEngine driverTraversal(const Device& device);
-TraversalEngine softwareTraversal();
+/// Argument of an example for pipelines of the driver's; the default where the device is no CPU, which may leave ray
+/// queries to Glint's engine. Joined ones have "--tracing software".
+const char* driverTracing(const Device& device);
 
 }  // namespace glint::bench

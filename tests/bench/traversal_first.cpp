@@ -39,14 +39,14 @@ struct Costs {
     double wall[2], processor[2];  ///< cold, warm: seconds
 };
 
-Costs measure(const char* program, const TraversalEngine& engine) {
+Costs measure(const char* program, const char* tracing) {
     const test::TempDir folder;
     const std::string path = folder.path().string();
     const std::string caches = fmt::format("GLINT_CACHE='{0}/glint' MESA_SHADER_CACHE_DIR='{0}/mesa' "
                                            "__GL_SHADER_DISK_CACHE=1 __GL_SHADER_DISK_CACHE_PATH='{0}' "
-                                           "XDG_CACHE_HOME='{0}/other' {1}",
-                                           path, engine.environment);
-    const std::string arguments = "--size 64x64 --time 0 " + engine.arguments;
+                                           "XDG_CACHE_HOME='{0}/other'",
+                                           path);
+    const std::string arguments = fmt::format("--size 64x64 --time 0 {}", tracing);
     const auto start = [&] { return runExample(program, arguments, caches); };
     const ExampleRun cold = start();
     ExampleRun warm = start();
@@ -72,8 +72,8 @@ void run(Report& report) {
         if (figureOf(name, false).find(filter) == std::string::npos &&
             figureOf(name, true).find(filter) == std::string::npos)
             continue;
-        const Costs theirs = measure(program, driverTraversal(device));
-        const Costs ours = measure(program, softwareTraversal());
+        const Costs theirs = measure(program, driverTracing(device));
+        const Costs ours = measure(program, "--tracing software");
         for (const size_t i : {0u, 1u}) {
             fmt::print(
                 "  {:<19} {}: driver {:6.2f} s of processors, {:6.2f} s by the clock; software {:6.2f}, {:6.2f}\n",

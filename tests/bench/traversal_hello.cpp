@@ -24,11 +24,10 @@ constexpr float nearest = 1e-3f, farthest = 1000.0f;
 
 /// Milliseconds of a frame: by the device's clock, or, where the device is the processor, by the processor time of
 /// frames after the first, so that what other programs do is left out.
-double traceExample(const TraversalEngine& engine, const Device& device, uint32_t threads) {
+double traceExample(const char* way, const Device& device, uint32_t threads) {
     const auto run = [&](uint32_t frames) {
-        const std::string arguments =
-            fmt::format("--size {}x{} --time 0 --frames {} {}", width, height, frames, engine.arguments);
-        return runExample("06_hello_traversal", arguments, engine.environment);
+        const std::string arguments = fmt::format("--size {}x{} --time 0 --frames {} {}", width, height, frames, way);
+        return runExample("06_hello_traversal", arguments);
     };
     // Several hundred, as clocks rise under load alone.
     if (!device.getInfo().cpu) return run(gpu_frames).trace_ms;
@@ -91,11 +90,10 @@ void run(Report& report) {
 
     const Device device = createDevice();
     const bool has_pipelines = device.getFeatures().rayTracing;
-    const TraversalEngine driver = driverTraversal(device), software = softwareTraversal();
-    const TraversalEngine queries = {"query", "--query --tracing software", ""};
+    const char *const driver = driverTracing(device), *const software = "--tracing software",
+                      *const queries = "--query --tracing software";
     // What is compiled stays in the driver's cache.
-    for (const TraversalEngine& engine : {software, queries})
-        runExample("06_hello_traversal", "--size 16x16 " + engine.arguments, engine.environment);
+    for (const char* way : {software, queries}) runExample("06_hello_traversal", fmt::format("--size 16x16 {}", way));
     constexpr double never = std::numeric_limits<double>::infinity();
     double pipeline = never, joined = never, query = never, theirs = never;
     for (uint32_t turn = 0; turn < turns; turn++) {

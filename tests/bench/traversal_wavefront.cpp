@@ -369,32 +369,28 @@ std::vector<double> timesOf(std::span<const std::unique_ptr<Form>> sides, bool i
     return result;
 }
 
-void measure(Report& report, const Load& load, uint32_t width, uint32_t height, const char* size) {
-    // The driver's pipelines on a device of their own, before the others': which engine a Traversal has belongs to it.
-    ::unsetenv("GLINT_TRAVERSAL");
+void measure(Report& report, const Load& load, uint32_t width, uint32_t height, const char* size, bool is_cpu) {
     std::vector<std::string> names;
     std::vector<double> times;
     std::vector<Image> pictures;
     std::vector<std::string> parts;
-    const auto take = [&](std::span<const std::unique_ptr<Form>> sides, bool is_cpu, uint32_t rounds) {
+    const auto take = [&](std::span<const std::unique_ptr<Form>> sides, uint32_t rounds) {
         std::ranges::copy(timesOf(sides, is_cpu, rounds), std::back_inserter(times));
         for (const auto& side : sides) {
             pictures.push_back(side->picture());
             parts.push_back(side->parts());
         }
     };
-    const bool is_cpu = createDevice().getInfo().cpu;
     Device driver = createDevice(is_cpu ? TracingEngine::Driver : TracingEngine::Auto);
     if (driver.getFeatures().rayTracing) {
         std::vector<std::unique_ptr<Form>> sides;
-        // The Traversal first: what is built after it the driver builds, too.
+        // The driver builds, too, what is built after the first Traversal.
         const Traversal first = driver.createTraversal();
         const Scene scene(driver, !load.is_coherent);
         sides.push_back(std::make_unique<OneKernel>(driver, scene, load, width, height, OneKernel::Stages));
         names.emplace_back("driver's pipeline");
-        take(sides, is_cpu, is_cpu ? 1 : gpu_rounds);
+        take(sides, is_cpu ? 1 : gpu_rounds);
     }
-    ::setenv("GLINT_TRAVERSAL", "software", 1);
     Device device = createDevice(TracingEngine::Software);
     const Scene scene(device, !load.is_coherent);
     std::vector<std::unique_ptr<Form>> sides;
@@ -412,7 +408,7 @@ void measure(Report& report, const Load& load, uint32_t width, uint32_t height, 
         sides.push_back(std::make_unique<OneKernel>(device, scene, load, width, height, OneKernel::Refilled));
         names.emplace_back(forms[2]);
     }
-    take(sides, is_cpu, is_cpu ? cpu_rounds : gpu_rounds);
+    take(sides, is_cpu ? cpu_rounds : gpu_rounds);
 
     fmt::print("  {} at {} x {}: milliseconds{}, speed over the joined stages', pixels that differ from theirs by more "
                "than 2 and 16 of 255\n",
@@ -422,11 +418,12 @@ void measure(Report& report, const Load& load, uint32_t width, uint32_t height, 
         const size_t few = differences(pictures[i], pictures[joined], 2);
         fmt::print("    {:<18} {:9.2f}  {:6.3f}  {:6} {:6}  {}\n", names[i], times[i] * 1e3, times[joined] / times[i],
                    few, differences(pictures[i], pictures[joined], 16), parts[i]);
-        check(pictures[i].save(report.folder() / fmt::format("traversal_{}_{}.png", load.name, i)));
         // Rays at edges, which rounding sends elsewhere, and all that follows from them.
         if (few * 50 > pixels) throw std::runtime_error(fmt::format("the pictures of '{}' do not agree", names[i]));
     }
     std::fflush(stdout);
+    // To be looked at.
+    check(pictures[joined].save(report.folder() / fmt::format("traversal_{}{}.png", load.name, size)));
     for (size_t i = joined + 2; i < names.size(); i++)
         report.add(figureOf(load, names[i].c_str(), size), times[joined] / times[i], "ratio of speeds",
                    fmt::format("stages joined into one kernel, {} x {}", width, height), deviceName(device));
@@ -440,8 +437,9 @@ void run(Report& report) {
             return std::ranges::any_of(
                 forms, [&](const char* form) { return figureOf(load, form, size).find(filter) != std::string::npos; });
         };
-        if (wants("")) measure(report, load, is_cpu ? load.cpu_width : 1600, is_cpu ? load.cpu_height : 900, "");
-        if (!is_cpu && wants(".4k")) measure(report, load, 3840, 2160, ".4k");
+        if (wants(""))
+            measure(report, load, is_cpu ? load.cpu_width : 1600, is_cpu ? load.cpu_height : 900, "", is_cpu);
+        if (!is_cpu && wants(".4k")) measure(report, load, 3840, 2160, ".4k", is_cpu);
     }
 }
 

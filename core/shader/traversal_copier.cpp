@@ -87,9 +87,6 @@ void StageCopier::addVariables() {
         local_[id] = builder_.newId();
         const uint32_t storage_class = spv::StorageClassPrivate;
         builder_.addGlobal(Instruction(spv::OpVariable, variable.pointer, local_[id], std::array{storage_class}, 0));
-        const Instruction* const type = joiner_.values().find(variable.type);
-        if (isNested() && !module_->cut.empty() && type && type->opcode != spv::OpTypeRayQueryKHR)
-            forgotten_.push_back({local_[id], variable.type});
     }
 }
 
@@ -419,10 +416,6 @@ void StageCopier::writeBegin(uint32_t id, uint32_t flags_pointer) {
         const SkeletonNames::Variable& variable = names_.variables.at(name);
         return emit(spv::OpLoad, variable.type, std::array{variable.id});
     };
-    // A compiler cannot know that nobody waits for these values. Holding them through the search and the stages after
-    // it took lavapipe's compiler most of its time.
-    for (const SkeletonNames::Variable& variable : forgotten_)
-        emitStore(variable.id, emit(spv::OpUndef, variable.type, {}));
     for (uint32_t i = 0; i < structures_.size(); i++) {
         const Structure& structure = structures_[i];
         const auto begin = [&] {

@@ -100,8 +100,6 @@ private:
         bool operator==(const Structure&) const = default;
     };
     std::vector<Structure> structures_;
-    std::vector<SkeletonNames::Variable>
-        forgotten_;  ///< of stages that nest: found again, or not needed, after a trace
     std::map<std::array<uint32_t, 3>, uint32_t> places_;  ///< a variable, by its set, binding and type
 
     // Of the copy in the making.

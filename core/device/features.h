@@ -145,7 +145,7 @@ struct DeviceInfo {
     FeatureMask features = 0;  ///< all that the adapter offers
     /// Of an open device: which engine answers ray queries, and which runs ray-tracing pipelines; and why.
     std::string tracing;
-    std::string traversal;
+    std::string traversal;  ///< "none (...)" without rayTracing
 };
 
 }  // namespace glint

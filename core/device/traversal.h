@@ -48,7 +48,7 @@ public:
     /// How deep executeCallableEXT may nest, 2 unless it is said: 1 calls callable shaders that call none. More than
     /// max_callable_depth fails create() with "traversal.callable_depth"; deeper nesting in the shaders is undefined.
     Traversal& setCallableDepth(uint32_t depth, Where where = Where::current());
-    static constexpr uint32_t max_callable_depth = 31;
+    static constexpr uint32_t max_callable_depth = 31;  ///< of either engine
 
     /// Adds a record to a table: the group counts as above, `data` is what its shaders read in their shaderRecordEXT
     /// block, copied. Returns the record's index in its table. create() checks groups ("traversal.record_group") and

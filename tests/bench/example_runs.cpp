@@ -45,6 +45,16 @@ ExampleRun runExample(std::string_view name, const std::string& arguments, const
     return run;
 }
 
-const char* driverTracing(const Device& device) { return device.getInfo().cpu ? "--tracing driver" : "--tracing auto"; }
+// On GPUs pipelines are the driver's by default, also where it offers no ray queries: asking for it would be refused.
+Device createPipelineDevice() {
+    Device device = createDevice();
+    if (device.getInfo().cpu) device = createDevice(TracingEngine::Driver);
+    const Features& features = device.getFeatures();
+    return features.rayTracing && features.traversalEngine == TracingEngine::Driver ? device : Device();
+}
+
+const char* pipelineArgument(const Device& device) {
+    return device.getInfo().cpu ? "--tracing driver" : "--tracing auto";
+}
 
 }  // namespace glint::bench

@@ -19,8 +19,9 @@ struct ExampleRun {
 /// if it has not been built or fails.
 ExampleRun runExample(std::string_view name, const std::string& arguments, const std::string& environment = {});
 
-/// Argument of an example for pipelines of the driver's; the default where the device is no CPU, which may leave ray
-/// queries to Glint's engine. Joined ones have "--tracing software".
-const char* driverTracing(const Device& device);
+/// A device on which Traversals are the driver's pipelines, whoever answers ray queries; a null handle if it has none.
+Device createPipelineDevice();
+/// The argument that gives an example such a device. Joined pipelines have "--tracing software".
+const char* pipelineArgument(const Device& device);
 
 }  // namespace glint::bench

@@ -60,7 +60,7 @@ Costs measure(const char* program, const char* tracing) {
 
 void run(Report& report) {
     const Device device = createDevice();
-    if (!device.getFeatures().rayTracing) {
+    if (!createPipelineDevice()) {
         fmt::print("  left out: {} has no ray-tracing pipelines\n\n", device.getInfo().name);
         return;
     }
@@ -72,7 +72,7 @@ void run(Report& report) {
         if (figureOf(name, false).find(filter) == std::string::npos &&
             figureOf(name, true).find(filter) == std::string::npos)
             continue;
-        const Costs theirs = measure(program, driverTracing(device));
+        const Costs theirs = measure(program, pipelineArgument(device));
         const Costs ours = measure(program, "--tracing software");
         for (const size_t i : {0u, 1u}) {
             fmt::print(

@@ -109,8 +109,8 @@ void run(Report& report) {
     std::vector<uint8_t> shadows(rays.shadow.size());
 
     const Device device = createDevice();
-    const bool has_pipelines = device.getFeatures().rayTracing;
-    Way driver(driverTracing(device), 1, device), software("--tracing software", 5, device);
+    const bool has_pipelines = static_cast<bool>(createPipelineDevice());
+    Way driver(pipelineArgument(device), 1, device), software("--tracing software", 5, device);
     Way queries("--query --tracing software", 5, device);
     // What is compiled stays in the driver's cache.
     for (const char* way : {"", "--query"})

@@ -6,6 +6,7 @@
 // by processor time of all threads, on GPUs by the device's clock, there also at 3840 x 2160 (.4k).
 
 #include "06_hello_traversal/scene.h"
+#include "bench/example_runs.h"
 #include "bench/tracing_batch.h"
 #include "support/files.h"
 
@@ -381,8 +382,7 @@ void measure(Report& report, const Load& load, uint32_t width, uint32_t height, 
             parts.push_back(side->parts());
         }
     };
-    Device driver = createDevice(is_cpu ? TracingEngine::Driver : TracingEngine::Auto);
-    if (driver.getFeatures().rayTracing) {
+    if (Device driver = createPipelineDevice()) {
         std::vector<std::unique_ptr<Form>> sides;
         // The driver builds, too, what is built after the first Traversal.
         const Traversal first = driver.createTraversal();

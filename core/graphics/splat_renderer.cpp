@@ -38,7 +38,7 @@ struct Frame {
     uint32_t first_depth = 0;
     uint32_t last_key = 0;
     uint32_t antialiased = 0;
-    uint32_t reserved = 0;
+    uint32_t key_bits = 0;
 };
 static_assert(sizeof(Frame) == 64);
 
@@ -119,6 +119,7 @@ void setDepths(Frame& frame, float near, const Camera& camera, std::span<const S
     };
     frame.first_depth = bitsOf(std::min(least, most));
     frame.last_key = bitsOf(most) - frame.first_depth;
+    frame.key_bits = static_cast<uint32_t>(std::bit_width(std::max(frame.last_key, 1u)));
 }
 
 /// At least `groups` groups, in two dimensions where one has too few.
@@ -383,8 +384,7 @@ Status SplatRenderer::State::sort(Compute& compute, const Frame& frame, Where wh
     compute.setPushConstants(blocks, where);
     compute.dispatch(scan_group, 1, 1, where);
     if (Status status = select(1); !status) return status;
-    const auto bits = static_cast<uint32_t>(std::bit_width(std::max(frame.last_key, 1u)));
-    splat_sort.dispatchIndirect(compute, keys, state, offsetof(DeviceState, splats), bits, where);
+    splat_sort.dispatchIndirect(compute, keys, state, offsetof(DeviceState, splats), frame.key_bits, where);
     return {};
 }
 

@@ -15,7 +15,7 @@ layout(std140, set = 0, binding = 0) uniform Frame {
     uint first_depth;  // bits of the least view depth
     uint last_key;     // sort keys of depths are from 0 to it
     uint antialiased;
-    uint reserved;
+    uint key_bits;     // of sort keys, at most 31; above them is how many tiles a splat reaches, as far as it fits
 } frame;
 
 // A splat on the picture, 32 bytes. Coordinates are relative to the picture's middle, so that their rounding is

@@ -3,8 +3,27 @@
 
 shared uint group_sums[GLINT_GROUP];
 
-// Of the values of the threads before this one, at most 2^32 - 1. All threads of the group call it.
+// Threads are counted by subgroups, whatever their order in the group.
+uint threadIndex() { return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID; }
+
+// Of the values of the threads before this one, as threadIndex() counts them. All threads of the group call it.
 uint sumBefore(uint value, out uint total) {
+    const uint before = subgroupExclusiveAdd(value);
+    const uint sum = subgroupAdd(value);
+    if (gl_SubgroupInvocationID == 0u) group_sums[gl_SubgroupID] = sum;
+    barrier();
+    uint others = 0u;
+    total = 0u;
+    for (uint i = 0u; i < gl_NumSubgroups; i++) {
+        others += i < gl_SubgroupID ? group_sums[i] : 0u;
+        total += group_sums[i];
+    }
+    barrier();
+    return before + others;
+}
+
+// The same with sums that end at 2^32 - 1, for threads as gl_LocalInvocationIndex counts them.
+uint boundedSumBefore(uint value, out uint total) {
     const uint local = gl_LocalInvocationIndex;
     uint sum = value;
     group_sums[local] = sum;

@@ -9,6 +9,7 @@
 layout(local_size_x = GLINT_GROUP) in;
 
 layout(std430, binding = 1) buffer Sums { uint sums[]; };
+const uint AT_ONCE = 8u;
 layout(push_constant) uniform Work { uint count; } work;  // of blocks in stage 0
 
 #if GLINT_STAGE == 1
@@ -40,20 +41,28 @@ void main() {
 #endif
     const uint run = (blocks + GLINT_GROUP - 1u) / GLINT_GROUP;
     const uint begin = min(gl_LocalInvocationIndex * run, blocks), end = min(begin + run, blocks);
+    // Several at a time, so that they are waited for together.
     uvec2 own = uvec2(0u);
-    for (uint i = begin; i < end; i++) {
-        uint carry;
-        own.x = uaddCarry(own.x, sums[i], carry);
-        own.y += carry;
+    for (uint first = begin; first < end; first += AT_ONCE) {
+        uint values[AT_ONCE];
+        [[unroll]] for (uint i = 0u; i < AT_ONCE; i++) values[i] = first + i < end ? sums[first + i] : 0u;
+        [[unroll]] for (uint i = 0u; i < AT_ONCE; i++) {
+            uint carry;
+            own.x = uaddCarry(own.x, values[i], carry);
+            own.y += carry;
+        }
     }
     uint total;
-    uint sum = sumBefore(own.y == 0u ? own.x : ~0u, total);
-    for (uint i = begin; i < end; i++) {
-        const uint value = sums[i];
-        sums[i] = sum;
-        uint carry;
-        sum = uaddCarry(sum, value, carry);
-        if (carry != 0u) sum = ~0u;
+    uint sum = boundedSumBefore(own.y == 0u ? own.x : ~0u, total);
+    for (uint first = begin; first < end; first += AT_ONCE) {
+        uint values[AT_ONCE];
+        [[unroll]] for (uint i = 0u; i < AT_ONCE; i++) values[i] = first + i < end ? sums[first + i] : 0u;
+        [[unroll]] for (uint i = 0u; i < AT_ONCE; i++) {
+            if (first + i < end) sums[first + i] = sum;
+            uint carry;
+            sum = uaddCarry(sum, values[i], carry);
+            if (carry != 0u) sum = ~0u;
+        }
     }
 #if GLINT_STAGE == 0
     if (gl_LocalInvocationIndex != 0u) return;

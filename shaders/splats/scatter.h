@@ -25,19 +25,25 @@ void writeEntry(uint place, uint tile, uint splat) {
 #endif
 
 
+// Of the i-th splat, from its key, which is read in order; the largest number there means that it does not fit.
+uint tilesOf(uint i) {
+    const uint count = order[i] >> frame.key_bits;
+    return count != ~0u >> frame.key_bits ? count : infos[order[frame.room + i]].y;
+}
+
 #if GLINT_STAGE == 0 || !GLINT_WIDE
 
 void main() {
     const uint block = groupIndex();
     const uint count = state.splats.size;
-    const uint begin = min(block * GLINT_BLOCK + gl_LocalInvocationIndex * RUN, count);
+    const uint begin = min(block * GLINT_BLOCK + threadIndex() * RUN, count);
     const uint end = min(begin + RUN, count);
     uint own = 0u;
-    for (uint i = begin; i < end; i++) own += infos[order[frame.room + i]].y;
+    for (uint i = begin; i < end; i++) own += tilesOf(i);
     uint total;
     const uint before = sumBefore(own, total);
 #if GLINT_STAGE == 0
-    if (gl_LocalInvocationIndex == 0u && block * GLINT_BLOCK < count) sums[block] = total;
+    if (threadIndex() == 0u && block * GLINT_BLOCK < count) sums[block] = total;
 #else
     if (begin == end) return;
     uint carry;
@@ -46,7 +52,7 @@ void main() {
     for (uint i = begin; i < end && place < frame.capacity; i++) {
         const uint splat = order[frame.room + i];
         const Footprint f = readFootprint(splat);
-        const uint stop = place + min(infos[splat].y, frame.capacity - place);
+        const uint stop = place + min(tilesOf(i), frame.capacity - place);
         const uvec2 rows = tileRows(f);
         for (uint row = rows.x; row < rows.y; row++) {
             const uvec2 span = tileSpan(f, row);
@@ -79,7 +85,7 @@ shared uint owners[GLINT_GROUP];       // of the rows
 
 void main() {
     const uint block = groupIndex();
-    const uint local = gl_LocalInvocationIndex;
+    const uint local = threadIndex();
     const uint i = block * GLINT_BLOCK + local;
     const uint none = frame.tiles.x * frame.tiles.y;
     const uint begin = block * GLINT_BLOCK < state.splats.size ? sums[block] : ~0u;
@@ -90,7 +96,7 @@ void main() {
         const uint splat = order[frame.room + i];
         const Footprint f = readFootprint(splat);
         rows = tileRows(f);
-        tiles = infos[splat].y;
+        tiles = tilesOf(i);
         own_footprints[local] = f;
         numbers[local] = splat;
         first_rows[local] = rows.x;

@@ -17,21 +17,22 @@ layout(push_constant) uniform Work { uint count; } work;
 
 void main() {
     const uint block = groupIndex();
-    const uint begin = min(block * GLINT_BLOCK + gl_LocalInvocationIndex * RUN, work.count);
+    const uint begin = min(block * GLINT_BLOCK + threadIndex() * RUN, work.count);
     const uint end = min(begin + RUN, work.count);
     uint visible = 0u;
     for (uint i = begin; i < end; i++) visible += min(infos[i].y, 1u);
     uint total;
     uint place = sumBefore(visible, total);
 #if GLINT_STAGE == 0
-    if (gl_LocalInvocationIndex == 0u && block * GLINT_BLOCK < work.count) sums[block] = total;
+    if (threadIndex() == 0u && block * GLINT_BLOCK < work.count) sums[block] = total;
 #else
     if (visible == 0u) return;
     place += sums[block];
     for (uint i = begin; i < end; i++) {
         const uvec2 info = infos[i];
         if (info.y == 0u) continue;
-        keys[place] = min(max(info.x, frame.first_depth) - frame.first_depth, frame.last_key);
+        const uint key = min(max(info.x, frame.first_depth) - frame.first_depth, frame.last_key);
+        keys[place] = key | min(info.y, ~0u >> frame.key_bits) << frame.key_bits;
         keys[frame.room + place] = i;
         place++;
     }

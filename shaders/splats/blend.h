@@ -20,14 +20,16 @@ layout(binding = 7) writeonly uniform image2D transmittance_picture;
 #endif
 
 #if GLINT_SHARED
-// Parts of 8 pixels in width, 32 threads each.
+// Parts of 8 pixels in width, 32 threads each: strips of 8 x 4, of which each thread has a pixel.
 const uint PARTS = GLINT_GROUP / 32u, PARTS_X = GLINT_TILE_X / 8u;
-const uint PART_Y = 4u * GLINT_ROWS;
+const uint STRIPS_Y = GLINT_TILE_Y / 4u;
+const uint STEP = 4u;  // rows from one pixel of a thread to the next
 const uint WORDS = GLINT_GROUP / 32u;
 const uint THREADS_X = 8u;
 #else
 // Threads along x; each has GLINT_COLUMNS columns at this distance.
 const uint THREADS_X = GLINT_TILE_X / GLINT_COLUMNS;
+const uint STEP = 1u;
 #endif
 // Beyond every logarithm of alpha.
 const float NEVER = 1e30;
@@ -38,9 +40,9 @@ const float NEVER = 1e30;
 shared vec2 centers[2][GLINT_GROUP];
 shared vec4 conics[2][GLINT_GROUP];
 shared vec4 paints[2][GLINT_GROUP];
-shared uint is_open[3];
-// Which splats of a batch reach each part: a bit each.
-shared uint reaching[3][PARTS * WORDS];
+shared uint open_strips[3][PARTS];
+// Which splats of a batch reach each strip: a bit each.
+shared uint reaching[3][PARTS * GLINT_ROWS * WORDS];
 #endif
 
 Footprint read(uint entry, out float depth) {
@@ -62,25 +64,32 @@ void main() {
     uvec2 corner = origin + uvec2(local % THREADS_X, local / THREADS_X * GLINT_ROWS);
 #if GLINT_SHARED
     const uint part = local / 32u;
-    corner = origin + uvec2(part % PARTS_X * 8u + local % 8u, part / PARTS_X * PART_Y + local % 32u / 8u * GLINT_ROWS);
+    corner = origin + uvec2(part % PARTS_X * 8u + local % 8u, part / PARTS_X * (4u * GLINT_ROWS) + local % 32u / 8u);
 #endif
     const vec2 pixel = vec2(corner) + 0.5 - frame.half_size;
 
     vec3 colors[GLINT_COLUMNS][GLINT_ROWS];
     float transmittances[GLINT_COLUMNS][GLINT_ROWS];
+#if !GLINT_SHARED
     // Least logarithm of alpha that counts; none does in a pixel that has ended.
     float cuts[GLINT_COLUMNS][GLINT_ROWS];
+    uint open = 0u;  // pixels that have not ended
+#endif
 #if GLINT_DEPTH
     float depths[GLINT_COLUMNS][GLINT_ROWS];
 #endif
-    uint open = 0u;  // pixels that have not ended
     [[unroll]] for (uint c = 0u; c < GLINT_COLUMNS; c++)
         [[unroll]] for (uint r = 0u; r < GLINT_ROWS; r++) {
             colors[c][r] = vec3(0.0);
+            const bool is_inside = corner.x + c * THREADS_X < frame.size.x && corner.y + r * STEP < frame.size.y;
+#if GLINT_SHARED
+            // What is outside has ended.
+            transmittances[c][r] = is_inside ? 1.0 : -1.0;
+#else
             transmittances[c][r] = 1.0;
-            const bool is_inside = corner.x + c * THREADS_X < frame.size.x && corner.y + r < frame.size.y;
             cuts[c][r] = is_inside ? frame.log_cut : NEVER;
             open += uint(is_inside);
+#endif
 #if GLINT_DEPTH
             depths[c][r] = 0.0;
 #endif
@@ -92,8 +101,8 @@ void main() {
 #if GLINT_SHARED
     Footprint next;
     float next_depth;
-    if (local < 3u) is_open[local] = 0u;
-    for (uint i = local; i < 3u * PARTS * WORDS; i += GLINT_GROUP) reaching[i % 3u][i / 3u] = 0u;
+    for (uint i = local; i < 3u * PARTS; i += GLINT_GROUP) open_strips[i % 3u][i / 3u] = 0u;
+    for (uint i = local; i < 3u * PARTS * GLINT_ROWS * WORDS; i += GLINT_GROUP) reaching[i % 3u][i / 3u] = 0u;
     if (range.x + local < range.y) next = read(range.x + local, next_depth);
     barrier();
     uint batch = 0u;
@@ -105,30 +114,45 @@ void main() {
             paints[place][local] = vec4(unpackColor(next.color), next_depth);
             const float left = float(origin.x) + 0.5 - frame.half_size.x;
             const float height = heightOf(next);
-            for (uint row = 0u; row < PARTS / PARTS_X; row++) {
-                const float top = float(origin.y + row * PART_Y) + 0.5 - frame.half_size.y - next.center.y;
-                const float bottom = top + float(PART_Y - 1u);
-                if (top > height || bottom < -height) continue;
-                const vec2 span = next.center.x + widthBetween(next, top, bottom);
+            // Strips between the ellipse's highest and lowest points.
+            const float above = next.center.y + frame.half_size.y - 0.5 - float(origin.y);
+            const uint first = uint(max(ceil((above - height - 3.0) * 0.25), 0.0));
+            const uint last = uint(clamp(floor((above + height) * 0.25) + 1.0, 0.0, float(STRIPS_Y)));
+            for (uint strip = first; strip < last; strip++) {
+                const float top = float(4u * strip) - above;
+                const vec2 span = next.center.x + widthBetween(next, top, top + 3.0);
                 [[unroll]] for (uint x = 0u; x < PARTS_X; x++)
-                    if (span.x <= left + float(8u * x + 7u) && span.y >= left + float(8u * x))
-                        atomicOr(reaching[third][(row * PARTS_X + x) * WORDS + local / 32u], 1u << (local % 32u));
+                    if (span.x <= left + float(8u * x + 7u) && span.y >= left + float(8u * x)) {
+                        const uint at = (strip / GLINT_ROWS * PARTS_X + x) * GLINT_ROWS + strip % GLINT_ROWS;
+                        atomicOr(reaching[third][at * WORDS + local / 32u], 1u << (local % 32u));
+                    }
             }
         }
-        if (open != 0u) is_open[third] = 1u;
+        uint open = 0u;
+        [[unroll]] for (uint r = 0u; r < GLINT_ROWS; r++) open |= transmittances[0][r] > frame.stop ? 1u << r : 0u;
+        if (open != 0u) atomicOr(open_strips[third][part], open);
         barrier();
-        if (is_open[third] == 0u) break;
+        uint any_open = 0u;
+        [[unroll]] for (uint i = 0u; i < PARTS; i++) any_open |= open_strips[third][i];
+        if (any_open == 0u) break;
         batch++;
         const uint after_next = (third + 2u) % 3u;
-        if (local == 0u) is_open[after_next] = 0u;
-        for (uint i = local; i < PARTS * WORDS; i += GLINT_GROUP) reaching[after_next][i] = 0u;
+        if (local < PARTS) open_strips[after_next][local] = 0u;
+        for (uint i = local; i < PARTS * GLINT_ROWS * WORDS; i += GLINT_GROUP) reaching[after_next][i] = 0u;
         // While this batch is blended the next one is on its way.
         if (begin + GLINT_GROUP + local < range.y) next = read(begin + GLINT_GROUP + local, next_depth);
+        const uint strips = open_strips[third][part];
         for (uint word = 0u; word < WORDS; word++) {
-            uint left = reaching[third][part * WORDS + word];
+            uint masks[GLINT_ROWS], left = 0u;
+            [[unroll]] for (uint r = 0u; r < GLINT_ROWS; r++) {
+                const uint reached = reaching[third][(part * GLINT_ROWS + r) * WORDS + word];
+                masks[r] = (strips & (1u << r)) != 0u ? reached : 0u;
+                left |= masks[r];
+            }
             while (left != 0u) {
+                const uint bit = left & (0u - left);
                 const uint i = word * 32u + uint(findLSB(left));
-                left &= left - 1u;
+                left ^= bit;
                 center = centers[place][i];
                 conic = conics[place][i];
                 paint = paints[place][i];
@@ -153,6 +177,19 @@ void main() {
                     if (most - nearest * nearest >= frame.log_cut)
 #endif
                     [[unroll]] for (uint r = 0u; r < GLINT_ROWS; r++) {
+#if GLINT_SHARED
+                        // A branch for 32 threads together; within it all of them work, which is cheaper than to part.
+                        if ((masks[r] & bit) == 0u) continue;
+                        const float down = along + float(r * STEP) * conic.z;
+                        const float power = most - down * down;
+                        const bool is_seen = power >= frame.log_cut && transmittances[c][r] > frame.stop;
+                        const float weight = is_seen ? transmittances[c][r] * exp2(power) : 0.0;
+                        colors[c][r] += weight * paint.rgb;
+#if GLINT_DEPTH
+                        depths[c][r] += weight * paint.a;
+#endif
+                        transmittances[c][r] -= weight;
+#else
                         const float power = most - along * along;
                         if (power >= cuts[c][r]) {
                             const float weight = transmittances[c][r] * exp2(power);
@@ -167,6 +204,7 @@ void main() {
                             }
                         }
                         along += conic.z;
+#endif
                     }
                 }
             }
@@ -175,7 +213,7 @@ void main() {
 
     [[unroll]] for (uint c = 0u; c < GLINT_COLUMNS; c++)
         [[unroll]] for (uint r = 0u; r < GLINT_ROWS; r++) {
-            const uvec2 place = corner + uvec2(c * THREADS_X, r);
+            const uvec2 place = corner + uvec2(c * THREADS_X, r * STEP);
             if (place.x >= frame.size.x || place.y >= frame.size.y) continue;
             const float coverage = 1.0 - max(transmittances[c][r], 0.0);
             imageStore(picture, ivec2(place), vec4(colors[c][r], coverage));

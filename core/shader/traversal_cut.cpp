@@ -14,8 +14,9 @@ namespace glint::shader {
 
 namespace {
 
-[[noreturn]] void unsupported(std::string message) {
-    throw RewriteRefusal{ErrorCode::Unsupported, "shader.traversal_unsupported", std::move(message)};
+[[noreturn]] void unsupported(std::string_view what, std::string_view line = {}) {
+    throw RewriteRefusal{ErrorCode::Unsupported, "shader.traversal_unsupported",
+                         fmt::format("{}{}: {}", line.empty() ? "" : ", ", line, what)};
 }
 
 class Cutter {
@@ -152,8 +153,13 @@ private:
         const Instruction* const item = elsewhere(id, head);
         if (!item) return;
         if (isMadeAgain(*item)) return needOperands(*item, head);
-        if (isOpaque(item->type())) unsupported("what a branch before traceRayEXT has chosen is no number");
+        if (isOpaque(item->type())) unsupported("what a branch before traceRayEXT has chosen is no number", line_);
         needed_.insert(id);
+    }
+
+    std::string lineOf(const Instruction& item) const {
+        const auto file = std::ranges::find(module_.sources, item.operands()[0], &Instruction::result);
+        return fmt::format("{}:{}", file->text(0), item.operands()[1]);
     }
 
     void needOperands(const Instruction& item, uint32_t head) {
@@ -168,7 +174,11 @@ private:
             for (size_t i = 0; i < phi.operands().size(); i += 2)
                 if (const uint32_t from = pieces_->headOf(phi.operands()[i + 1])) need(phi.operands()[i], from);
         }
-        for (const Instruction& item : block.body) needOperands(item, head);
+        line_.clear();
+        for (const Instruction& item : block.body) {
+            if (item.opcode == spv::OpLine) line_ = lineOf(item);
+            needOperands(item, head);
+        }
         if (block.end.opcode != spv::OpBranch) needOperands(block.end, head);
     }
 
@@ -311,11 +321,16 @@ private:
                         phi_values_[{block.label, phi.result()}] = here(phi.operands()[i]);
         }
         switch (block.end.opcode) {
-            case spv::OpTraceRayKHR:
+            case spv::OpTraceRayKHR: {
                 out_.push_back(withOperandsHere(block.end));
-                result_.pieces[numbers_.at(head_)].after = numbers_.at(block.targets[0]);
-                result_.pieces[numbers_.at(block.targets[0])].payload = block.end.operands()[10];
+                const uint32_t number = numbers_.at(block.targets[0]);
+                result_.pieces[numbers_.at(head_)].after = number;
+                StagePiece& after = result_.pieces[number];
+                after.payload = block.end.operands()[10];
+                for (const Instruction& item : block.body)
+                    if (item.opcode == spv::OpLine) after.line = lineOf(item);
                 return leave(block.label, block.targets[0]);
+            }
             case spv::OpReturn: return leaveTo(static_cast<uint32_t>(heads_.size()));
             case spv::OpBranch:
                 if (pieces_->leaves(block.label, block.targets[0])) return leave(block.label, block.targets[0]);
@@ -399,6 +414,7 @@ private:
     std::unordered_map<uint32_t, uint32_t> types_;    ///< opcodes
     std::unordered_map<uint32_t, Instructions> notes_;
     std::unordered_map<uint32_t, Definition> definitions_;
+    std::string line_;                                  ///< in which values are looked at
     std::set<uint32_t> needed_;                         ///< values that have a variable
     std::unordered_map<uint32_t, uint32_t> variables_;  ///< theirs
     StageCut result_;

@@ -4,6 +4,8 @@
 
 #include "spirv_module.h"
 
+#include <string>
+
 namespace glint::shader {
 
 /// A part of a stage that runs without a break: a function without parameters.
@@ -16,6 +18,7 @@ struct StagePiece {
     /// trace it or a later piece may read, the payload's apart.
     uint32_t payload = 0;
     std::vector<uint32_t> live;
+    std::string line;  ///< the trace's, "file:7", where the module has lines
 };
 
 /// How a stage's entry point was cut. To run it: set `next` to 0 and call pieces[next] until `next` is pieces.size().
@@ -33,7 +36,8 @@ bool traces(const SpirvModule& module, uint32_t entry);
 /// Replaces the entry point, which calls no function that traces, and none with pointers to its own variables, by its
 /// pieces. Its variables and the values that one piece takes over from another become variables of the module
 /// (Private). Any control flow can be cut: a construct without traces stays whole within a piece, and that of all
-/// others becomes the order in which the pieces run. Throws RewriteRefusal, its message without the stage's name.
+/// others becomes the order in which the pieces run. Throws RewriteRefusal, whose message is to follow the stage's
+/// name.
 StageCut cutAtTraces(SpirvModule& module, uint32_t entry);
 
 }  // namespace glint::shader

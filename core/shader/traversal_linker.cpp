@@ -90,7 +90,7 @@ private:
         try {
             stage.cut = cutAtTraces(stage.spirv, stage.entry);
         } catch (RewriteRefusal& refusal) {
-            refusal.message = fmt::format("{}: {}", stage.title, refusal.message);
+            refusal.message = stage.title + refusal.message;
             throw;
         }
     }
@@ -106,11 +106,23 @@ private:
         for (const auto& [id, variable] : stage.own) addNeeds(needs, stage, variable);
     }
 
+    static std::string_view nameOf(const JoinedModule& stage, uint32_t id) {
+        const auto notes = stage.notes.find(id);
+        if (notes != stage.notes.end())
+            for (const Instruction* note : notes->second)
+                if (note->opcode == spv::OpName) return note->text(1);
+        return {};
+    }
+
     void addSaved(SkeletonNeeds& needs, const JoinedModule& stage) {
-        const std::string what = fmt::format("{}: what it goes on with after traceRayEXT", stage.title);
         for (const StagePiece& piece : stage.cut.pieces) {
             uint32_t words = 0;
-            for (const uint32_t id : piece.live) words += joiner_.values().count(stage.own.at(id).type, true, what);
+            for (const uint32_t id : piece.live) {
+                const std::string what =
+                    fmt::format("{}{}{}: '{}', with which it goes on after traceRayEXT,", stage.title,
+                                piece.line.empty() ? "" : ", ", piece.line, nameOf(stage, id));
+                words += joiner_.values().count(stage.own.at(id).type, true, what);
+            }
             needs.saved_words = std::max(needs.saved_words, words);
         }
     }

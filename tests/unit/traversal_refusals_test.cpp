@@ -36,6 +36,7 @@ protected:
     Error refusal(const Shader& shader, const char* rays = generation) {
         EXPECT_THAT(shader, IsOk());
         Traversal traversal = device.createTraversal("refused");
+        traversal.setRecursionDepth(recursion);
         traversal.setShader(Shader::createGLSL(Shader::TypeRayGen, rays, {}, "rays.shader"));
         traversal.setShader(shader);
         if (!traversal.getHitGroups()) traversal.addHitGroup();
@@ -56,6 +57,7 @@ protected:
 
     Device device;
     std::string told;
+    uint32_t recursion = 1;
 };
 
 TEST_F(TraversalRefusals, EndsWhereALoopGoesOn) {
@@ -134,6 +136,24 @@ OpFunctionEnd
     EXPECT_EQ(shader.error().file(), "writing.spvasm");
     EXPECT_EQ(shader.error().line(), 19u);
     EXPECT_THAT(shader.error().message(), testing::HasSubstr("read only"));
+}
+
+TEST_F(TraversalRefusals, QueriesHeldThroughATrace) {
+    const Shader shader = Shader::createGLSL(Shader::TypeClosest, R"(
+layout(binding = 0) uniform accelerationStructureEXT scene;
+layout(location = 0) rayPayloadInEXT vec4 payload;
+layout(location = 1) rayPayloadEXT vec4 second;
+void main() {
+    rayQueryEXT query;
+    rayQueryInitializeEXT(query, scene, 0u, 0xff, vec3(0.0), 0.0, vec3(0.0, 0.0, 1.0), 1.0);
+    while (rayQueryProceedEXT(query)) break;
+    traceRayEXT(scene, 0u, 0xff, 0, 1, 0, vec3(0.0), 0.0, vec3(0.0, 0.0, -1.0), 100.0, 1);
+    while (rayQueryProceedEXT(query)) payload += second;
+}
+)",
+                                             {}, "held.shader");
+    recursion = 2;
+    expectRefused(shader, "the Closest shader 'held.shader'", ", held.shader:9", "'query', with which it goes on");
 }
 
 // What is about a whole shader has no line.

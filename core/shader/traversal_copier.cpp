@@ -107,7 +107,8 @@ void StageCopier::readBuiltIn(const StageVariable& variable) {
         }
         source = input;
     } else {
-        unsupported(fmt::format("built-in variable {} has no counterpart", variable.built_in));
+        unsupported(fmt::format("built-in variable {} ('{}') has no counterpart", variable.built_in,
+                                module_->nameOf(variable.id)));
     }
     uint32_t value = emit(spv::OpLoad, source.type, std::array{source.id});
     if (source.type != variable.type) value = emit(spv::OpBitcast, variable.type, std::array{value});

@@ -106,21 +106,13 @@ private:
         for (const auto& [id, variable] : stage.own) addNeeds(needs, stage, variable);
     }
 
-    static std::string_view nameOf(const JoinedModule& stage, uint32_t id) {
-        const auto notes = stage.notes.find(id);
-        if (notes != stage.notes.end())
-            for (const Instruction* note : notes->second)
-                if (note->opcode == spv::OpName) return note->text(1);
-        return {};
-    }
-
     void addSaved(SkeletonNeeds& needs, const JoinedModule& stage) {
         for (const StagePiece& piece : stage.cut.pieces) {
             uint32_t words = 0;
             for (const uint32_t id : piece.live) {
                 const std::string what =
                     fmt::format("{}{}{}: '{}', with which it goes on after traceRayEXT,", stage.title,
-                                piece.line.empty() ? "" : ", ", piece.line, nameOf(stage, id));
+                                piece.line.empty() ? "" : ", ", piece.line, stage.nameOf(id));
                 words += joiner_.values().count(stage.own.at(id).type, true, what);
             }
             needs.saved_words = std::max(needs.saved_words, words);

@@ -91,6 +91,14 @@ bool isDecorated(const JoinedModule& module, uint32_t id) {
 
 }  // namespace
 
+std::string_view JoinedModule::nameOf(uint32_t id) const {
+    const auto found = notes.find(id);
+    if (found != notes.end())
+        for (const Instruction* note : found->second)
+            if (note->opcode == spv::OpName) return note->text(1);
+    return {};
+}
+
 uint32_t ModuleJoiner::idOf(JoinedModule& module, uint32_t id) {
     const auto [found, is_new] = module.ids.try_emplace(id, 0);
     if (is_new) found->second = builder_.newId();

@@ -35,6 +35,9 @@ struct JoinedModule {
     std::unordered_map<uint32_t, std::vector<const Instruction*>> notes;  ///< names and decorations of an id
     std::unordered_map<uint32_t, std::string> strings;                    ///< OpString
     std::unordered_map<uint32_t, uint32_t> built_ins;
+
+    /// An id's, for messages; empty where the module has none.
+    std::string_view nameOf(uint32_t id) const;
 };
 
 class ModuleJoiner {

@@ -156,6 +156,27 @@ void main() {
     expectRefused(shader, "the Closest shader 'held.shader'", ", held.shader:9", "'query', with which it goes on");
 }
 
+TEST_F(TraversalRefusals, ExtensionsOfOneVendor) {
+    expectRefused(Shader::createGLSL(Shader::TypeFirstHit, R"(
+#extension GL_NV_ray_tracing : require
+layout(location = 0) rayPayloadInNV vec4 payload;
+void main() {
+    payload.x += 1.0;
+    ignoreIntersectionNV();
+}
+)",
+                                     {}, "vendor.shader"),
+                  "the FirstHit shader 'vendor.shader'", "", "NVIDIA's own extensions of ray tracing");
+    expectRefused(Shader::createGLSL(Shader::TypeRayMiss, R"(
+#extension GL_NV_shader_sm_builtins : require
+layout(location = 0) rayPayloadInEXT vec4 payload;
+void main() { payload.x = float(gl_SMIDNV); }
+)",
+                                     {}, "processor.shader"),
+                  "the RayMiss shader 'processor.shader'", "",
+                  "built-in variable 5377 ('gl_SMIDNV') has no counterpart");
+}
+
 // What is about a whole shader has no line.
 TEST_F(TraversalRefusals, NarrowWordsInRecords) {
     const Shader shader = Shader::createGLSL(Shader::TypeClosest, R"(

@@ -134,15 +134,11 @@ Tracing Device::createTracing(std::span<const Tracing::Instance> instances, Trac
 Traversal Device::createTraversal(std::string_view name, Where where) {
     Traversal traversal = make<Traversal, detail::TraversalObject>(*this, name, where);
     if (traversal.state() != ObjectState::Building) return traversal;
-    DeviceObject& object = *opened(*this);
-    if (object.features().rayTracing) {
-        if (!object.joinsTraversals()) object.buildForTraversals();
-    } else {
+    if (!opened(*this)->features().rayTracing)
         traversal.object()->fail(makeError(where, ErrorCode::Unsupported, "device.unsupported",
                                            "{}: {} {} the feature {}", traversal.object()->label(), getInfo().name,
                                            getInfo().features & FeatureRayTracing ? "was opened without" : "lacks",
                                            toString(FeatureRayTracing)));
-    }
     return traversal;
 }
 

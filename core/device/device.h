@@ -47,7 +47,8 @@ struct DeviceDesc {
     std::string adapter;                 ///< index or part of a name; empty: $GLINT_ADAPTER, else the best
     FeatureMask required = FeatureNone;  ///< creation fails without them
     FeatureMask optional = FeatureAll;   ///< enabled where the adapter has them
-    /// Who answers ray queries and runs ray-tracing pipelines. Auto: $GLINT_TRACING ("auto", "driver", "software"), else as TracingEngine says.
+    /// Who answers ray queries and runs ray-tracing pipelines. Auto: $GLINT_TRACING ("auto", "driver", "software"),
+    /// else as TracingEngine says.
     TracingEngine tracing = TracingEngine::Auto;
     /// Khronos validation layer with synchronisation checks. Default: $GLINT_VALIDATION is 1, or a debug build.
     enum class Validation : uint8_t { Default, Off, On } validation = Validation::Default;
@@ -146,10 +147,7 @@ public:
         return createTracing(std::span(instances.begin(), instances.size()), Tracing::FlagFastTrace, {}, where);
     }
 
-    /// A ray-tracing pipeline to configure. Where pipelines are the driver's and ray queries are not
-    /// (Features::traversalEngine, tracingEngine), the driver builds structures, too, from the first call on; earlier
-    /// ones have to be built again before a Traversal sees them ("tracing.traversal"). Errors: "device.unsupported"
-    /// without Features::rayTracing.
+    /// A ray-tracing pipeline to configure. Errors: "device.unsupported" without Features::rayTracing.
     Traversal createTraversal(std::string_view name = {}, Where where = Where::current());
 
     // Recorders.

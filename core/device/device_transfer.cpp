@@ -1,6 +1,5 @@
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
-#include <glint/device/detail/driver_tracing.h>
 #include <glint/device/detail/recorder_core.h>
 #include <glint/device/detail/texture_layout.h>
 #include <glint/device/device.h>
@@ -35,6 +34,33 @@ Status readBack(DeviceObject& device, void* data, uint64_t size, Device::Where w
     });
     if (status) std::memcpy(data, memory.nativeBuffer()->mapped, size);
     return status;
+}
+
+/// Scratch memory for builds to run side by side, within reason.
+uint64_t reasonableScratch(uint64_t largest, uint64_t total) {
+    constexpr uint64_t reasonable = 32ull << 20;
+    return std::max(largest, std::min(total, reasonable));
+}
+
+/// Calls build(tracings, offsets) for as many builds at a time as find room in `size` bytes of scratch memory, which
+/// are enough for each of them.
+template <class Build>
+void forEachBatch(std::span<TracingObject* const> tracings, uint64_t size, uint64_t alignment, Build&& build) {
+    std::vector<uint64_t> offsets;
+    uint64_t offset = 0;
+    size_t first = 0;
+    for (size_t i = 0; i < tracings.size(); i++) {
+        const uint64_t needed = tracings[i]->nativeTracing()->build_size;
+        if (offset + needed > size) {
+            if (i > first) build(tracings.subspan(first, i - first), std::span<const uint64_t>(offsets));
+            offsets.clear();
+            offset = 0;
+            first = i;
+        }
+        offsets.push_back(offset);
+        offset += (needed + alignment - 1) / alignment * alignment;
+    }
+    if (first < tracings.size()) build(tracings.subspan(first), std::span<const uint64_t>(offsets));
 }
 
 }  // namespace
@@ -120,7 +146,7 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
             return core->error();
         }
     } else {
-        const Expected<Ref<BufferObject>> own = device.acquireScratch(detail::reasonableScratch(largest, total), where);
+        const Expected<Ref<BufferObject>> own = device.acquireScratch(reasonableScratch(largest, total), where);
         if (!own) {
             core->fail(own.error());
             return core->error();
@@ -129,10 +155,10 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
     }
 
     const auto build = [&](std::span<TracingObject* const> objects) {
-        detail::forEachBatch(objects, false, memory->size, device.features().scratchAlignment,
-                             [&](std::span<TracingObject* const> batch, std::span<const uint64_t> offsets) {
-                                 core->buildTracings(batch, offsets, *memory, false, where);
-                             });
+        forEachBatch(objects, memory->size, device.features().scratchAlignment,
+                     [&](std::span<TracingObject* const> batch, std::span<const uint64_t> offsets) {
+                         core->buildTracings(batch, offsets, *memory, false, where);
+                     });
     };
 
     std::vector<TracingObject*> compacted;
@@ -141,14 +167,8 @@ Status Device::buildTracings(std::span<const Tracing> tracings, const Buffer& sc
             if (object->flags & Tracing::FlagCompact) compacted.push_back(object);
     if (device.heap()) {
         if (Status status = device.buildOnHost(levels[0], where); !status) return status;
-        core->buildForTraversals(levels[0], false, where);
-        std::vector<TracingObject*> of_driver;
-        for (TracingObject* object : compacted) {
-            // Ours have no room to spare.
-            object->compacted = true;
-            if (object->driver) of_driver.push_back(object->driver.get());
-        }
-        if (Status status = device.compact(core, of_driver, where); !status) return status;
+        // Ours have no room to spare.
+        for (TracingObject* object : compacted) object->compacted = true;
     } else {
         build(levels[0]);
         if (Status status = device.compact(core, compacted, where); !status) return status;

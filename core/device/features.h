@@ -42,7 +42,9 @@ enum Feature : uint64_t {
 /// Who answers ray queries and runs ray-tracing pipelines: the driver, or Glint's own hierarchies, traversal in the
 /// shader and pipelines joined into kernels (docs/tracing.md).
 enum class TracingEngine : uint8_t {
-    Auto,  ///< for either, the driver where the device is no CPU and offers what was asked for, else software
+    /// For queries, the driver where the device is no CPU and offers what was asked for, else software. For pipelines,
+    /// the driver where it has them and queries are, or would be, its own.
+    Auto,
     Driver,
     Software,
 };
@@ -77,9 +79,10 @@ struct Features {
     bool shaderu64 = false;
     bool atomicBufferu64 = false;
 
-    /// Who provides computeTracing and fragmentTracing; never Auto on an open device.
+    /// Who builds structures and provides computeTracing and fragmentTracing; never Auto on an open device.
     TracingEngine tracingEngine = TracingEngine::Driver;
-    /// Who provides rayTracing; with Software, computeTracing is there, too.
+    /// Who provides rayTracing: Driver only beside the driver's structures; with Software, computeTracing is there,
+    /// too.
     TracingEngine traversalEngine = TracingEngine::Driver;
 
     uint32_t recursionDepth = 0;    ///< of ray-tracing pipelines; this and the next four are 0 without rayTracing

@@ -350,12 +350,7 @@ Error ProgramObject::checkFeatures(const Reflection& stage, Where where) const {
     FeatureMask needed = 0;
     if (stage.stage >= ShaderStage::RayGen) {
         needed |= FeatureRayTracing;
-        // The software engine rewrites no stage of the driver's pipelines.
-        if (stage.uses_ray_query && !device()->joinsTraversals() &&
-            !device()->backend->features().has(FeatureComputeTracing))
-            return problem(where, ErrorCode::Unsupported, "program.feature",
-                           fmt::format("the {} shader has ray queries, which the driver of {} does not offer",
-                                       glint::toString(stage.stage), device()->info().name));
+        if (stage.uses_ray_query) needed |= FeatureComputeTracing;
     } else if (asksRays(stage)) {
         needed |= stage.stage == ShaderStage::Compute ? FeatureComputeTracing : FeatureFragmentTracing;
     }

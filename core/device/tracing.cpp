@@ -2,7 +2,6 @@
 
 #include <glint/base/format_error.h>
 #include <glint/device/detail/device_object.h>
-#include <glint/device/detail/driver_tracing.h>
 #include <glint/device/detail/software_tracing.h>
 
 #include <algorithm>
@@ -54,6 +53,28 @@ detail::BufferObject* input(TracingObject& tracing, const char* what, const Buff
                         object->label(), object->size);
     tracing.buffers.emplace_back(object);
     return object;
+}
+
+/// The driver's structure for a configured one and, for a top level, room for its instances.
+Expected<std::unique_ptr<detail::NativeTracing>> createDriverTracing(TracingObject& tracing,
+                                                                     std::source_location where) {
+    detail::DeviceObject& device = *tracing.device();
+    if (tracing.tracing_type == Tracing::TypeInstance) {
+        detail::NativeBufferDesc desc;
+        desc.size = std::max<uint64_t>(tracing.instances, 1) * device.backend->instanceSize();
+        desc.flags = Buffer::FlagTracing | Buffer::FlagAddress;
+        desc.name = "instances";
+        Expected<detail::Ref<detail::BufferObject>> made = device.createInternal(desc, where);
+        if (!made) return unexpected(made.error());
+        tracing.instance_buffer = std::move(*made);
+    }
+    detail::NativeTracingDesc desc;
+    desc.type = tracing.tracing_type;
+    desc.flags = tracing.flags;
+    desc.geometries = tracing.geometries;
+    desc.instances = tracing.instances;
+    desc.name = tracing.name();
+    return device.backend->createTracing(desc);
 }
 
 }  // namespace
@@ -161,14 +182,11 @@ Status Tracing::create(Type type, Flags flags, std::source_location where) {
         return complain(ErrorCode::OutOfRange, "tracing.too_large", "{} primitives exceed the limit of {}",
                         getPrimitives(), limit);
 
-    if (device.heap()) {
-        Expected<std::unique_ptr<detail::NativeTracing>> made = detail::createSoftwareTracing(device, *object, where);
-        if (!made) return Status(object->fail(made.error().at(where)));
-        object->native = std::move(*made);
-        object->setReady();
-        return {};
-    }
-    if (const Error error = detail::createDriverNative(*object, where)) return Status(object->fail(error));
+    Expected<std::unique_ptr<detail::NativeTracing>> made =
+        device.heap() ? detail::createSoftwareTracing(device, *object, where) : createDriverTracing(*object, where);
+    if (!made) return Status(object->fail(made.error().at(where)));
+    object->native = std::move(*made);
+    object->setReady();
     return {};
 }
 
@@ -199,9 +217,7 @@ uint64_t Tracing::getUpdateSize() const {
 }
 
 uint64_t Tracing::getMemory() const {
-    if (!*this) return 0;
-    const auto& object = *static_cast<TracingObject*>(object_);
-    return object.nativeTracing()->memory + (object.driver ? object.driver->nativeTracing()->memory : 0);
+    return *this ? static_cast<TracingObject*>(object_)->nativeTracing()->memory : 0;
 }
 
 }  // namespace glint

@@ -70,8 +70,7 @@ public:
     /// Bytes of scratch memory that a build or an update needs.
     uint64_t getBuildSize() const;
     uint64_t getUpdateSize() const;
-    /// Bytes of the structure; less after compaction. Before the first build in software: the most that it may take. On
-    /// devices with a Traversal, with what the driver builds beside it.
+    /// Bytes of the structure; less after compaction. Before the first build in software: the most that it may take.
     uint64_t getMemory() const;
 };
 

@@ -108,7 +108,6 @@ int Course::run(uint32_t recursion, const std::function<void(Traversal&)>& load,
     if (!device) return report(device.error());
     use_query_ = use_query_ || needsQueries(example_, device, recursion);
 
-    // Before the structures, which are built for the programs that the device has.
     Kernel kernel;
     Traversal traversal;
     if (use_query_) {

@@ -74,8 +74,6 @@ protected:
         ConformanceTest::SetUp();
         if (!device) return;
         GLINT_NEED_FEATURE(FeatureRayTracing);
-        // From here on the driver builds structures, too.
-        device.createTraversal();
     }
 
     Traversal makeTraversal(const std::vector<RayShader>& shaders,

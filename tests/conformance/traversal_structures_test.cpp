@@ -54,70 +54,12 @@ protected:
         if (device.getFeatures().computeTracing) { EXPECT_EQ(queryDown(scene, expected.size()), expected); }
     }
 
-    /// A device that has no traversal yet.
-    void openAnother() {
-        device = {};
-        DeviceDesc desc;
-        desc.validation = DeviceDesc::Validation::On;
-        desc.message = log.callback();
-        device = Device::create(desc);
-        ASSERT_TRUE(device) << device.error().text();
-    }
-
-    /// Structures are built by both engines: pipelines are the driver's, ray queries are not.
-    bool hasTwins() {
-        const Features& features = device.getFeatures();
-        return features.traversalEngine == TracingEngine::Driver && features.tracingEngine == TracingEngine::Software;
-    }
-
 private:
     Traversal distances_;
     Kernel query_;
 };
 
 }  // namespace
-
-TEST_F(TraversalStructures, OlderOnesHaveToBeBuiltAgain) {
-    openAnother();
-    GLINT_NEED_FEATURE(FeatureRayTracing);
-    const Tracing square = makeSquares({0});
-    const Tracing scene = makeTop({place(square)});
-    const uint64_t memory = square.getMemory();
-    const Traversal traversal = makeDistances();
-    const auto look = [&] {
-        Compute list = device.createCompute();
-        list.setTraversal(traversal);
-        list.setTracing(0, scene);
-        list.setPushConstants(RayArguments());
-        list.setStorageBuffer(0, makeBuffer(Words(1)));
-        list.dispatch(1);
-        return device.submit(list);
-    };
-    if (!hasTwins()) {
-        EXPECT_THAT(look(), IsOk());
-        EXPECT_EQ(square.getMemory(), memory);
-        return;
-    }
-    expectError("tracing.traversal", look);
-    // A top level alone does not help, nor does it hurt those who look with queries.
-    build(scene);
-    const Error error = errorOf(look());
-    expectTold("tracing.traversal");
-    EXPECT_THAT(error.message(), testing::HasSubstr("'squares'"));
-    EXPECT_EQ(queryDown(scene, 2), (Words{40, 1}));
-    build(square);
-    expectError("tracing.traversal", look);
-    build(scene);
-    EXPECT_THAT(look(), IsOk());
-    EXPECT_GT(square.getMemory(), memory);
-    expectBoth(scene, {40, 1});
-
-    // A newer one among its instances, then an older one again.
-    const Tracing lower = makeSquares({0}, -2);
-    device.setTracing(scene, std::vector<Tracing::Instance>{place(lower)});
-    build(scene);
-    expectBoth(scene, {48, 1});
-}
 
 TEST_F(TraversalStructures, BuiltOneByOneAndInLists) {
     for (const Tracing::Flags flags : {Tracing::Flags(Tracing::FlagFastTrace), Tracing::Flags(Tracing::FlagFastBuild)})
@@ -264,18 +206,12 @@ void main() {
     payload = 100u + uint(rayQueryGetIntersectionTEXT(query, true));
 }
 )");
-    const Status created = traversal.create();
-    if (created) {
-        EXPECT_EQ(lookDown(traversal, scene, 2), (Words{103, 1}));
-    } else {
-        // Where pipelines are the driver's and queries are not, nobody answers them here.
-        EXPECT_TRUE(hasTwins());
-        expectTold("program.feature");
-    }
+    ASSERT_THAT(traversal.create(), IsOk());
+    EXPECT_EQ(lookDown(traversal, scene, 2), (Words{103, 1}));
 }
 
 TEST_F(TraversalStructures, ManyShareAScratchBuffer) {
-    // More than one batch of the driver's builds, in either engine.
+    // For the driver's builds more than one batch.
     std::vector<Tracing> all;
     std::vector<Tracing::Instance> instances;
     constexpr uint32_t count = 24;

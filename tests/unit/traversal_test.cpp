@@ -1,5 +1,5 @@
-// Ray-tracing pipelines on the null device, whose checker judges what they read and write: the driver's, joined into
-// kernels, and the driver's beside ray queries of the software engine, where structures are built by both.
+// Ray-tracing pipelines on the null device, whose checker judges what they read and write: the driver's, and joined
+// into kernels over ray queries of the driver's and of the software engine.
 
 #include "support/matchers.h"
 
@@ -22,15 +22,17 @@ using null::NullControl;
 
 constexpr FeatureMask queries = FeatureComputeTracing | FeatureFragmentTracing;
 
-enum class Form : uint8_t { Driver, Joined, Twins };
-const char* nameOf(Form form) { return form == Form::Driver ? "Driver" : form == Form::Joined ? "Joined" : "Twins"; }
+enum class Form : uint8_t { Driver, JoinedOverDriver, JoinedOverSoftware };
+const char* nameOf(Form form) {
+    return form == Form::Driver ? "Driver" : form == Form::JoinedOverDriver ? "JoinedOverDriver" : "JoinedOverSoftware";
+}
 
 class TraversalOnNull : public testing::TestWithParam<Form> {
 protected:
     void SetUp() override {
         const null::ScopedSettings settings(
-            {.missing = GetParam() == Form::Twins ? queries : FeatureMask(FeatureNone)});
-        const TracingEngine engines[] = {TracingEngine::Driver, TracingEngine::Software, TracingEngine::Auto};
+            {.missing = GetParam() == Form::JoinedOverDriver ? FeatureRayTracing : FeatureNone});
+        const TracingEngine engines[] = {TracingEngine::Driver, TracingEngine::Auto, TracingEngine::Software};
         const TracingEngine engine = engines[static_cast<size_t>(GetParam())];
         device = Device::create({.api = "null", .tracing = engine, .message = [this](const Message& message) {
                                      if (!is_failing) ADD_FAILURE() << message.error.text();
@@ -94,6 +96,8 @@ void main() {
         return control->counters().barriers - before;
     }
 
+    bool isJoined() const { return GetParam() != Form::Driver; }
+
     bool is_failing = false;  ///< on purpose
     Device device;
     std::shared_ptr<NullControl> control;
@@ -143,7 +147,7 @@ TEST_P(TraversalOnNull, CountsWaitForWhoWritesThem) {
                   list.dispatchIndirect(buffers[2], 16);
               }),
               // One for all: what the rays wrote, and the counts. Joined, they are copied, judged, and read.
-              GetParam() == Form::Joined ? 3u : 1u);
+              isJoined() ? 3u : 1u);
 }
 
 TEST_P(TraversalOnNull, TracesFollowWhatWasBuilt) {
@@ -196,7 +200,7 @@ TEST_P(TraversalOnNull, GoesWhenTheQueueHasPassedIt) {
     const uint64_t objects = control->counters().objects;
     traversal = {};
     // A joined one has memory for counts that no list has used.
-    EXPECT_EQ(control->counters().objects, objects - (GetParam() == Form::Joined));
+    EXPECT_EQ(control->counters().objects, objects - isJoined());
     top = {};
     control->release(Queue::Main);
     EXPECT_THAT(device.finish(), IsOk());
@@ -248,84 +252,109 @@ TEST_P(TraversalOnNull, BuildsSideBySideHaveScratchMemoryOfTheirOwn) {
         instances.push_back({.tracing = &all.back()});
     }
     ASSERT_THAT(device.buildTracings(all, Buffer(), Tracing::FlagCompact), IsOk());
-    EXPECT_EQ(largest, GetParam() == Form::Joined ? 0u : 8u);
+    EXPECT_EQ(largest, GetParam() == Form::JoinedOverSoftware ? 0u : 8u);
     const Tracing top = device.createTracing(instances);
     // Compacted structures have no size of a build any more, only that of an update.
-    largest = 0;
     barriers([&](Compute& list) {
         for (const Tracing& bottom : all) list.updateTracing(bottom);
         list.buildTracing(top);
         trace(list, top, buffers[0], buffers[1]);
     });
-    if (GetParam() == Form::Twins) { EXPECT_EQ(largest, 8u); }
     control->setObserver({});
 }
 
-INSTANTIATE_TEST_SUITE_P(Engines, TraversalOnNull, testing::Values(Form::Driver, Form::Joined, Form::Twins),
+INSTANTIATE_TEST_SUITE_P(Engines, TraversalOnNull,
+                         testing::Values(Form::Driver, Form::JoinedOverDriver, Form::JoinedOverSoftware),
                          [](const auto& test) { return std::string(nameOf(test.param)); });
 
 TEST(TraversalChoice, FollowsWhatWasAskedForAndIsThere) {
     using enum TracingEngine;
     struct Case {
         TracingEngine wanted;
-        FeatureMask missing;
+        FeatureMask missing, optional;
         TracingEngine traversal, tracing;
+        FeatureMask offered;  ///< of the three
     };
+    constexpr FeatureMask compute = FeatureComputeTracing, pipelines = FeatureRayTracing, all = queries | pipelines;
     const Case cases[] = {
-        {Auto, FeatureNone, Driver, Driver},
-        {Auto, queries, Driver, Software},
-        {Auto, FeatureRayTracing, Software, Driver},
-        {Auto, FeatureRayTracing | queries, Software, Software},
-        {Driver, FeatureNone, Driver, Driver},
-        {Software, FeatureNone, Software, Software},
-        {Software, FeatureRayTracing | queries, Software, Software},
+        {Auto, FeatureNone, queries, Driver, Driver, all},
+        {Auto, queries, queries, Software, Software, all},
+        {Auto, FeatureFragmentTracing, queries, Software, Software, all},
+        {Auto, FeatureFragmentTracing, compute, Driver, Driver, compute | pipelines},
+        {Auto, pipelines, queries, Software, Driver, all},
+        {Auto, all, queries, Software, Software, all},
+        // Without queries asked for, they come along only where pipelines become queries.
+        {Auto, FeatureNone, FeatureNone, Driver, Driver, pipelines},
+        {Auto, queries, FeatureNone, Software, Software, compute | pipelines},
+        {Auto, pipelines, FeatureNone, Software, Driver, compute | pipelines},
+        {Auto, pipelines | compute, FeatureFragmentTracing, Software, Software, all},
+        {Driver, FeatureNone, queries, Driver, Driver, all},
+        {Driver, queries, queries, Driver, Driver, pipelines},
+        {Driver, FeatureNone, FeatureNone, Driver, Driver, pipelines},
+        {Software, FeatureNone, queries, Software, Software, all},
+        {Software, all, FeatureNone, Software, Software, compute | pipelines},
     };
     for (const Case& item : cases) {
-        SCOPED_TRACE(toString(item.wanted) + (" without " + featureNames(item.missing)));
+        SCOPED_TRACE(toString(item.wanted) + (" without " + featureNames(item.missing)) + ", asked for " +
+                     featureNames(item.optional));
         const null::ScopedSettings settings({.missing = item.missing});
-        Device device = Device::create({.api = "null", .required = FeatureRayTracing, .tracing = item.wanted});
+        Device device = Device::create(
+            {.api = "null", .required = FeatureRayTracing, .optional = item.optional, .tracing = item.wanted});
         ASSERT_THAT(device, IsOk());
         const Features& features = device.getFeatures();
-        EXPECT_TRUE(features.rayTracing);
+        EXPECT_EQ(features.mask, item.offered);
         EXPECT_EQ(features.traversalEngine, item.traversal);
         EXPECT_EQ(features.tracingEngine, item.tracing);
         EXPECT_EQ(device.createTraversal().state(), ObjectState::Building);
     }
-    // Without the feature there is none, whoever it would have been.
+}
+
+TEST(TraversalChoice, IsNamedWithItsReason) {
+    const auto reasons = [](FeatureMask missing) {
+        const null::ScopedSettings settings({.missing = missing});
+        const DeviceInfo info = Device::create({.api = "null"}).getInfo();
+        return std::pair(info.traversal, info.tracing);
+    };
+    using testing::HasSubstr, testing::Pair;
+    EXPECT_THAT(reasons(FeatureNone), Pair("driver (the driver's, on a device that is no CPU)",
+                                           "driver (the driver's, on a device that is no CPU)"));
+    EXPECT_THAT(reasons(queries), Pair("software (the driver lacks computeTracing, fragmentTracing)",
+                                       HasSubstr("(the driver lacks computeTracing, fragmentTracing)")));
+    EXPECT_THAT(reasons(FeatureRayTracing),
+                Pair("software (the driver lacks rayTracing)", "driver (the driver's, on a device that is no CPU)"));
+}
+
+TEST(TraversalChoice, MayBeNone) {
+    using enum TracingEngine;
     const null::ScopedSettings settings({.missing = FeatureRayTracing});
     const auto ignore = [](const Message&) {};
     Device driver = Device::create({.api = "null", .tracing = Driver, .message = ignore});
     EXPECT_FALSE(driver.getFeatures().rayTracing);
-    EXPECT_THAT(driver.getInfo().traversal, testing::HasSubstr("none"));
+    EXPECT_EQ(driver.getInfo().traversal, "none (the driver offers no ray-tracing pipelines)");
     EXPECT_THAT(driver.createTraversal(), HasErrorId("device.unsupported"));
     Device bare = Device::create({.api = "null", .optional = queries, .message = ignore});
     EXPECT_FALSE(bare.getFeatures().rayTracing);
+    EXPECT_EQ(bare.getInfo().traversal, "none (no ray-tracing pipelines asked for)");
     EXPECT_THAT(bare.createTraversal(), HasErrorId("device.unsupported"));
-    // Queries come along only where pipelines become queries.
-    const Device joined = Device::create({.api = "null", .required = FeatureRayTracing, .optional = 0});
-    EXPECT_EQ(joined.getFeatures().mask, FeatureRayTracing | FeatureComputeTracing);
-    const null::ScopedSettings all({});
-    const Device alone = Device::create({.api = "null", .required = FeatureRayTracing, .optional = 0});
-    EXPECT_EQ(alone.getFeatures().mask, FeatureMask(FeatureRayTracing));
 }
 
-TEST(TraversalBesideNone, CostsNothing) {
-    // Only a device with a traversal of the driver's has structures of the driver's beside the software engine's.
-    const auto count = [](bool with_traversal, TracingEngine engine) {
-        const null::ScopedSettings settings({.missing = queries});
-        Device device = Device::create({.api = "null", .tracing = engine});
-        if (with_traversal) device.createTraversal();
-        const Buffer vertices = device.createBuffer(Buffer::FlagTracing, 36, "vertices");
-        Tracing bottom = device.createTracing("bottom");
-        bottom.addVertexBuffer(3, FormatRGBf32, 12, vertices);
-        EXPECT_THAT(bottom.create(Tracing::TypeTriangle), IsOk());
-        EXPECT_THAT(device.buildTracings({bottom}), IsOk());
-        EXPECT_THAT(device.finish(), IsOk());
-        return NullControl::last()->counters().builds;
+TEST(TraversalChoice, QueriesInStagesAreThoseOfTheDevice) {
+    const auto create = [](FeatureMask missing, TracingEngine engine) {
+        const null::ScopedSettings settings({.missing = missing});
+        Device device = Device::create({.api = "null", .tracing = engine, .message = [](const Message&) {}});
+        Traversal traversal = device.createTraversal("traversal");
+        traversal.createShaderGLSL(Shader::TypeRayGen, R"(
+layout(binding = 0) uniform accelerationStructureEXT scene;
+void main() {
+    rayQueryEXT query;
+    rayQueryInitializeEXT(query, scene, 0u, 0xff, vec3(0.0), 0.0, vec3(1.0), 1.0);
+    rayQueryProceedEXT(query);
+})");
+        return traversal.create();
     };
-    EXPECT_EQ(count(false, TracingEngine::Auto), 0u);
-    EXPECT_EQ(count(true, TracingEngine::Auto), 1u);
-    EXPECT_EQ(count(true, TracingEngine::Software), 0u);
+    EXPECT_THAT(create(FeatureNone, TracingEngine::Driver), IsOk());
+    EXPECT_THAT(create(queries, TracingEngine::Auto), IsOk());
+    EXPECT_THAT(create(queries, TracingEngine::Driver), HasErrorId("program.feature"));
 }
 
 }  // namespace

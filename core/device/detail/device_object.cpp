@@ -28,7 +28,7 @@ struct EngineChoice {
     std::string reason;
 };
 
-/// The one rule, for ray queries and for pipelines: `asked` are the features of either that were asked for.
+/// The rule for ray queries, and for pipelines by themselves: `asked` are the features of either.
 EngineChoice chooseEngine(TracingEngine wanted, FeatureMask asked, const Features& driver, const DeviceInfo& info,
                           std::string_view what) {
     if (!asked) return {TracingEngine::Driver, fmt::format("no {} asked for", what)};
@@ -127,11 +127,15 @@ void DeviceObject::chooseEngines(TracingEngine wanted, FeatureMask asked) {
     features_ = driver;
     info_ = backend->info();
 
-    const EngineChoice pipelines =
-        chooseEngine(wanted, asked & FeatureRayTracing, driver, info_, "ray-tracing pipelines");
+    EngineChoice pipelines = chooseEngine(wanted, asked & FeatureRayTracing, driver, info_, "ray-tracing pipelines");
+    FeatureMask queried = asked & query_features;
+    const bool traverses = asked & FeatureRayTracing;
+    if (traverses && (pipelines.engine == TracingEngine::Software || !queried)) queried |= FeatureComputeTracing;
+    const EngineChoice queries = chooseEngine(wanted, queried, driver, info_, "ray queries");
+    // A structure is built by one of the two. So pipelines are the driver's only where queries are, asked for or not.
+    if (traverses && pipelines.engine == TracingEngine::Driver) pipelines = queries;
     const bool joins = pipelines.engine == TracingEngine::Software;
     if (joins) asked |= FeatureComputeTracing;
-    const EngineChoice queries = chooseEngine(wanted, asked & query_features, driver, info_, "ray queries");
     features_.traversalEngine = pipelines.engine;
     features_.tracingEngine = queries.engine;
 

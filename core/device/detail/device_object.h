@@ -9,7 +9,6 @@
 #include <glint/device/detail/tracker.h>
 #include <glint/device/device.h>
 
-#include <atomic>
 #include <memory>
 #include <mutex>
 #include <source_location>
@@ -33,7 +32,7 @@ public:
 
     const Features& features() const { return features_; }
     const DeviceInfo& info() const { return info_; }
-    /// The heap of the software engine, null if the driver answers ray queries.
+    /// The heap of the software engine, null if structures are the driver's.
     TracingHeap* heap() const { return heap_.get(); }
     MipmapKernels& mipmaps() { return mipmaps_; }
     /// The kernel that turns counts of rays into the arguments of a dispatch. From any thread.
@@ -42,9 +41,6 @@ public:
     bool joinsTraversals() const {
         return features_.rayTracing && features_.traversalEngine == TracingEngine::Software;
     }
-    /// From here on the driver builds structures beside the software engine: its pipelines are to see them.
-    void buildForTraversals() { traversals_.store(true, std::memory_order_relaxed); }
-    bool buildsForTraversals() const { return heap_ && traversals_.load(std::memory_order_relaxed); }
 
     /// Tells the message callback.
     void report(const Error& error, Message::Severity severity = Message::Severity::Error) const;
@@ -143,7 +139,6 @@ private:
     MipmapKernels mipmaps_{*this};
     std::mutex ray_count_mutex_;
     Ref<KernelObject> ray_count_kernel_;
-    std::atomic<bool> traversals_ = false;
 
     std::mutex submit_mutex_;  // of tracker_, next_value_, scratch below, last_use of objects
     Tracker tracker_;

@@ -379,8 +379,6 @@ public:
     /// numbers when it was built. Guarded by the submit lock.
     uint64_t moves = 0;
     uint64_t built_moves = 0;
-    /// Software engine: the same structure as the driver builds it, for traversals (driver_tracing.h).
-    Ref<TracingObject> driver;
     ResourceState use;
 };
 

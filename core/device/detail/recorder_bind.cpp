@@ -1,4 +1,3 @@
-#include <glint/device/detail/driver_tracing.h>
 #include <glint/device/detail/recorder_core.h>
 #include <glint/device/detail/texture_layout.h>
 
@@ -267,13 +266,6 @@ bool RecorderCore::checkBound(const ShaderResource& resource, SlotKind kind, uin
         case SlotKind::Tracing: {
             if (!traversal_) return true;
             const auto& tracing = *static_cast<const TracingObject*>(list_.resources[value.resource]);
-            const bool has_twin = device_->heap() && !traversal_->joined;
-            const TracingObject* const old = has_twin ? notBuiltByDriver(tracing) : nullptr;
-            if (old)
-                return complain("tracing.traversal",
-                                "is {}; {} was built before the device's first Traversal, so that the driver knows "
-                                "nothing of it: build it again, and then what refers to it",
-                                tracing.label(), old == &tracing ? "it" : old->label());
             // Without any hit record no shader is looked up.
             const uint32_t records = traversal_->countRecords(RayTable::Hit);
             if (records && tracing.built_offset >= records)
@@ -333,16 +325,11 @@ void RecorderCore::accessTable(const ShaderResource& resource, const TableConten
     }
 }
 
-TracingObject& RecorderCore::tracedObject(const ShaderResource& resource, const Bound& bound) const {
-    auto& tracing = *static_cast<TracingObject*>(list_.resources[bound.value.resource]);
-    return device_->heap() && !resource.isRewritten() ? *tracing.driver : tracing;
-}
-
 void RecorderCore::accessBound(const ShaderResource& resource, SlotKind kind, const Bound& bound) {
     if (kind == SlotKind::Sampler || bound.inlined) return;
     if (kind == SlotKind::Table)
         return accessTable(resource, static_cast<const TableContents&>(*list_.resources[bound.value.resource]));
-    const uint32_t index = kind == SlotKind::Tracing ? use(tracedObject(resource, bound)) : bound.value.resource;
+    const uint32_t index = bound.value.resource;
     const auto flags = static_cast<uint8_t>((resource.read ? AccessRead : 0) | (resource.write ? AccessWrite : 0));
     forEachStage(resource.stages, [&](Stage stage) {
         switch (kind) {
@@ -353,7 +340,8 @@ void RecorderCore::accessBound(const ShaderResource& resource, SlotKind kind, co
                 break;
             case SlotKind::Tracing:
                 access(index, stage, AccessRead);
-                for (const Ref<TracingObject>& reference : tracedObject(resource, bound).built_references)
+                for (const Ref<TracingObject>& reference :
+                     static_cast<TracingObject*>(list_.resources[index])->built_references)
                     access(use(*reference), stage, AccessRead);
                 break;
             case SlotKind::Uniform: access(index, stage, AccessRead); break;
@@ -412,7 +400,6 @@ bool RecorderCore::flushBindings(const char* what, Where where) {
                 } else {
                     const uint32_t second = element.second;
                     element = bound.value;
-                    if (kind == SlotKind::Tracing) element.resource = use(tracedObject(resource, bound));
                     element.second = second;
                     if (kind == SlotKind::Uniform) {
                         element.offset = 0;

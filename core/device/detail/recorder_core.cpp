@@ -58,7 +58,6 @@ void RecorderCore::clear() {
     placements_.clear();
     moves_.clear();
     pending_.clear();
-    driver_builds_.clear();
     shared_scratch_ = 0;
     heap_block_ = none;
     open_queries_.clear();
@@ -96,7 +95,7 @@ Status RecorderCore::end(Where where) {
     if (!open_queries_.empty())
         fail(where, ErrorCode::InvalidArgument, "query.open", "{} was begun and not ended",
              open_queries_.back().object()->label());
-    if (hasPending()) playPending();
+    if (!pending_.isEmpty()) playPending();
     if (graphics_ && !list_.error) {
         beginAccesses();
         push<EndTargetCommand>(CommandType::EndTarget);

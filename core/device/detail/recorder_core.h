@@ -37,7 +37,7 @@ public:
     Queue queue() const { return queue_; }
     const CommandList& list() const { return list_; }
     const Error& error() const { return list_.error; }
-    bool isEmpty() const { return list_.command_count == 0 && !hasPending(); }
+    bool isEmpty() const { return list_.command_count == 0 && pending_.isEmpty(); }
     Status end(Where where);
 
     bool submitted = false;
@@ -92,8 +92,6 @@ public:
     /// Builds that may run side by side, each with its scratch offset; checked by the caller.
     void buildTracings(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                        BufferObject& scratch, bool update, Where where);
-    /// Software engine: what has been built, or updated, as the driver builds it, if there are traversals.
-    void buildForTraversals(std::span<TracingObject* const> tracings, bool update, Where where);
     void copyTracing(TracingObject& destination, TracingObject& source, bool compact);
     void writeTracingSize(TracingObject& tracing);
     /// Makes what was copied to the buffer visible to the CPU after a wait.
@@ -213,7 +211,7 @@ private:
     }
     /// The accesses added from here on belong to the next push(), which comes after the builds that are pending.
     void beginAccesses() {
-        if (hasPending()) playPending();
+        if (!pending_.isEmpty()) playPending();
         first_access_ = static_cast<uint32_t>(list_.accesses.size());
     }
     void access(uint32_t resource, Stage stage, uint8_t flags) {
@@ -226,8 +224,6 @@ private:
     void writeInstances(TracingObject& tracing);
     void buildByDriver(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                        BufferObject& scratch, bool update, Where where);
-    void playDriverBuilds();
-    bool setDriverInstances(const TracingObject& from, TracingObject& twin);
     void buildInSoftware(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
                          BufferObject& scratch, bool update, Where where);
     bool buildInstancesOnHost(TracingObject& tracing, Where where);
@@ -236,7 +232,6 @@ private:
     bool writeDeviceInstances(TracingObject& tracing, PendingBuilds::Copy& copy, Where where);
     bool preparePass(const BuildPass& pass, TracingObject& tracing, const PendingBuilds::Scratch& scratch, Where where);
     void playPending();
-    void playSoftwareBuilds();
     /// Of the accesses that were begun.
     void copyInline(uint32_t resource, uint64_t offset, uint32_t place, uint64_t size);
     void makeMipmap(TextureObject& texture, const MipmapPlan& plan, size_t index, BufferObject& scratch, Where where);
@@ -260,8 +255,6 @@ private:
     bool checkTable(const ShaderResource& resource, const TableContents& table, uint32_t slot, const char* what,
                     Where where);
     void accessTable(const ShaderResource& resource, const TableContents& table);
-    /// What a program's slot of structures reads: the driver's in ray-tracing pipelines.
-    TracingObject& tracedObject(const ShaderResource& resource, const Bound& bound) const;
     void accessBound(const ShaderResource& resource, SlotKind kind, const Bound& bound);
     bool flushPush(const char* what, Where where);
     void shareAccesses(CommandHeader& header) const;
@@ -318,16 +311,7 @@ private:
 
     std::vector<Placement> placements_;
     std::vector<TracingHeap::Range> moves_;
-    /// A structure that the driver builds beside the software engine, after what is pending there.
-    struct DriverBuild {
-        TracingObject* tracing = nullptr;  ///< the list keeps it alive
-        bool update = false;
-        Where where;
-    };
-    bool hasPending() const { return !pending_.isEmpty() || !driver_builds_.empty(); }
-
     PendingBuilds pending_;
-    std::vector<DriverBuild> driver_builds_;
     uint64_t shared_scratch_ = 0;  ///< bytes of the device's scratch memory that pending builds use
     uint32_t heap_block_ = none;   ///< inline data: the heap's address
 

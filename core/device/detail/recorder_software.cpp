@@ -195,11 +195,6 @@ bool RecorderCore::preparePass(const BuildPass& pass, TracingObject& tracing, co
 }
 
 void RecorderCore::playPending() {
-    if (!pending_.isEmpty()) playSoftwareBuilds();
-    if (!driver_builds_.empty()) playDriverBuilds();
-}
-
-void RecorderCore::playSoftwareBuilds() {
     const auto count = [&] { return static_cast<uint32_t>(list_.accesses.size()); };
     for (const PendingBuilds::Copy& copy : pending_.copies()) {
         first_access_ = count();

@@ -1,7 +1,5 @@
 #include <glint/device/detail/recorder_core.h>
 
-#include <glint/device/detail/driver_tracing.h>
-
 #include <algorithm>
 #include <bit>
 #include <utility>
@@ -140,7 +138,6 @@ void RecorderCore::buildTracings(std::span<TracingObject* const> tracings, std::
     if (!recording(where)) return;
     if (!device_->heap()) return buildByDriver(tracings, offsets, scratch, update, where);
     buildInSoftware(tracings, offsets, scratch, update, where);
-    buildForTraversals(tracings, update, where);
 }
 
 void RecorderCore::buildByDriver(std::span<TracingObject* const> tracings, std::span<const uint64_t> offsets,
@@ -177,66 +174,6 @@ void RecorderCore::buildByDriver(std::span<TracingObject* const> tracings, std::
     command.header.untracked = false;
     command.builds = place;
     command.count = static_cast<uint32_t>(builds_.size());
-}
-
-void RecorderCore::buildForTraversals(std::span<TracingObject* const> tracings, bool update, Where where) {
-    if (!device_->buildsForTraversals()) return;
-    for (TracingObject* tracing : tracings) {
-        if (!recording(where)) return;
-        const Expected<TracingObject*> made = driverTracing(*tracing, where);
-        if (!made) return fail(made.error());
-        TracingObject& twin = **made;
-        const bool is_top = tracing->tracing_type == Tracing::TypeInstance;
-        // Those of one level that differ may run side by side.
-        const bool fits = std::ranges::none_of(driver_builds_, [&](const DriverBuild& pending) {
-            return pending.tracing == &twin || (pending.tracing->tracing_type == Tracing::TypeInstance) != is_top;
-        });
-        if (!fits) playPending();
-        if (!setDriverInstances(*tracing, twin)) continue;
-        use(twin);
-        // A top level may have other instances than it was built from.
-        driver_builds_.push_back({&twin, update && twin.built && !is_top, where});
-        confirmBuild(twin);
-    }
-}
-
-void RecorderCore::playDriverBuilds() {
-    const Where where = driver_builds_.back().where;
-    std::vector<TracingObject*> parts[2];
-    uint64_t largest = 1;
-    uint64_t total = 0;
-    for (const DriverBuild& pending : driver_builds_) {
-        parts[pending.update].push_back(pending.tracing);
-        const NativeTracing& native = *pending.tracing->nativeTracing();
-        const uint64_t size = pending.update ? native.update_size : native.build_size;
-        largest = std::max(largest, size);
-        total += size;
-    }
-    driver_builds_.clear();
-    const Expected<Ref<BufferObject>> scratch = device_->acquireScratch(reasonableScratch(largest, total), where);
-    if (!scratch) return fail(scratch.error());
-    for (const bool update : {false, true})
-        forEachBatch(parts[update], update, (*scratch)->size, device_->features().scratchAlignment,
-                     [&](std::span<TracingObject* const> batch, std::span<const uint64_t> offsets) {
-                         buildByDriver(batch, offsets, **scratch, update, where);
-                     });
-}
-
-bool RecorderCore::setDriverInstances(const TracingObject& from, TracingObject& twin) {
-    if (from.tracing_type != Tracing::TypeInstance) return true;
-    for (const Ref<TracingObject>& reference : from.references)
-        if (!reference->driver || !reference->driver->built) {
-            // Built before the first Traversal: the program is told when it lets one see the top level.
-            twin.built = false;
-            return false;
-        }
-    twin.instance_data = from.instance_data;
-    twin.instance_tracings.clear();
-    for (const TracingObject* bottom : from.instance_tracings)
-        twin.instance_tracings.push_back(bottom ? bottom->driver.get() : nullptr);
-    twin.references.clear();
-    for (const Ref<TracingObject>& reference : from.references) twin.references.push_back(reference->driver);
-    return true;
 }
 
 bool RecorderCore::checkReferences(const TracingObject& tracing, Where where) {

@@ -45,16 +45,9 @@ ExampleRun runExample(std::string_view name, const std::string& arguments, const
     return run;
 }
 
-// On GPUs pipelines are the driver's by default, also where it offers no ray queries: asking for it would be refused.
 Device createPipelineDevice() {
-    Device device = createDevice();
-    if (device.getInfo().cpu) device = createDevice(TracingEngine::Driver);
-    const Features& features = device.getFeatures();
-    return features.rayTracing && features.traversalEngine == TracingEngine::Driver ? device : Device();
-}
-
-const char* pipelineArgument(const Device& device) {
-    return device.getInfo().cpu ? "--tracing driver" : "--tracing auto";
+    Device device = createDevice(TracingEngine::Driver);
+    return device.getFeatures().rayTracing ? device : Device();
 }
 
 }  // namespace glint::bench

@@ -19,9 +19,8 @@ struct ExampleRun {
 /// if it has not been built or fails.
 ExampleRun runExample(std::string_view name, const std::string& arguments, const std::string& environment = {});
 
-/// A device on which Traversals are the driver's pipelines, whoever answers ray queries; a null handle if it has none.
+/// A device on which Traversals are the driver's pipelines, as an example has with "--tracing driver"; it may have no
+/// ray queries. A null handle if the driver has no pipelines. Joined ones have "--tracing software".
 Device createPipelineDevice();
-/// The argument that gives an example such a device. Joined pipelines have "--tracing software".
-const char* pipelineArgument(const Device& device);
 
 }  // namespace glint::bench

@@ -72,7 +72,7 @@ void run(Report& report) {
         if (figureOf(name, false).find(filter) == std::string::npos &&
             figureOf(name, true).find(filter) == std::string::npos)
             continue;
-        const Costs theirs = measure(program, pipelineArgument(device));
+        const Costs theirs = measure(program, "--tracing driver");
         const Costs ours = measure(program, "--tracing software");
         for (const size_t i : {0u, 1u}) {
             fmt::print(

@@ -110,7 +110,7 @@ void run(Report& report) {
 
     const Device device = createDevice();
     const bool has_pipelines = static_cast<bool>(createPipelineDevice());
-    Way driver(pipelineArgument(device), 1, device), software("--tracing software", 5, device);
+    Way driver("--tracing driver", 1, device), software("--tracing software", 5, device);
     Way queries("--query --tracing software", 5, device);
     // What is compiled stays in the driver's cache.
     for (const char* way : {"", "--query"})

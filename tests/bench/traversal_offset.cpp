@@ -2,7 +2,7 @@
 // offset, and at a fixed t_min, against rays that meet what they leave and rays that miss what is near. `./dev report`
 // makes the table and the chart of docs/accuracy.md from what is written.
 
-#include "bench/bench.h"
+#include "bench/example_runs.h"
 #include "support/secondary_judge.h"
 
 #include <glint/base/file.h>
@@ -44,9 +44,9 @@ std::vector<SecondaryCount> countAll(test::SecondaryTracer& tracer, const test::
 }
 
 void run(Report& report) {
-    const Device device = createDevice();
-    const bool has_pipelines = device.getFeatures().has(FeatureRayTracing);
-    test::SecondaryTracer tracer(device, has_pipelines ? test::SecondaryForm::Pipeline : test::SecondaryForm::Query);
+    const Device device = createDevice(), driver = createPipelineDevice();
+    test::SecondaryTracer tracer = driver ? test::SecondaryTracer(driver, test::SecondaryForm::Pipeline)
+                                          : test::SecondaryTracer(device, test::SecondaryForm::Query);
 
     std::vector<SecondaryStart> starts;
     for (const float multiple :
@@ -73,7 +73,7 @@ void run(Report& report) {
 
     std::string table =
         fmt::format("{}; {}, {} shadow rays and mirrored rays in {} cases.\n\n", deviceName(device),
-                    has_pipelines ? "ray-tracing pipeline" : "ray queries", all[0].rays, cases.size()) +
+                    driver ? "the driver's ray-tracing pipeline" : "ray queries", all[0].rays, cases.size()) +
         "| case | derived offset: acne, strays, leaks | contacts lost | t_min = 1e-3: acne | leaks | contacts lost | "
         "least t_min without acne | contacts lost with that |\n"
         "|---|---|---|---|---|---|---|---|\n";

@@ -384,8 +384,6 @@ void measure(Report& report, const Load& load, uint32_t width, uint32_t height, 
     };
     if (Device driver = createPipelineDevice()) {
         std::vector<std::unique_ptr<Form>> sides;
-        // The driver builds, too, what is built after the first Traversal.
-        const Traversal first = driver.createTraversal();
         const Scene scene(driver, !load.is_coherent);
         sides.push_back(std::make_unique<OneKernel>(driver, scene, load, width, height, OneKernel::Stages));
         names.emplace_back("driver's pipeline");

@@ -12,10 +12,14 @@ static_assert(sizeof(RadixSort::Region) == sizeof(detail::ParallelRegions::Regio
 namespace {
 
 /// GLINT_STAGE of shaders/parallel/sort.h.
-enum Stage : uint32_t { StageList, StageCount, StageRows, StageMove, StageSmall, stages };
+enum Stage : uint32_t { StageList, StageCount, StageRows, StageMove, StageSmall, StageTotals, StageSweep, stages };
 
 /// A digit has at most eight bits, and an even number of passes ends where it began.
 constexpr uint32_t digits = 256;
+constexpr uint32_t most_passes = 4;
+
+/// Bytes of the table that shaders/parallel/sort_sweep.h describes.
+uint64_t sweepTableSize(uint64_t tiles) { return (most_passes + 2 * tiles) * digits * 4; }
 
 }  // namespace
 
@@ -33,12 +37,15 @@ struct RadixSort::State {
     uint32_t small = 0;  ///< the most elements of a region that one group sorts
     detail::ParallelRegions regions;
     Passes single, multiple;
+    bool is_swept = false;  ///< one region, by StageTotals and StageSweep
     Buffer scratch;
     Buffer small_scratch;  ///< of each group, where threads walk runs
     Buffer jobs;
 
     Status create(const Device& device, uint32_t groups, uint32_t room, Where where);
     Status createKernels(Passes& passes, bool is_multiple, Where where) const;
+    bool canSweep(const Device& device) const;
+    Status createSweep(Where where);
     Status check(std::span<const Region> list, const Buffer& data, Where where) const;
     void record(Compute& compute, const Buffer& data, const detail::ParallelRegions::Source& source, uint32_t bits,
                 Where where) const;
@@ -70,7 +77,9 @@ Status RadixSort::State::create(const Device& device, uint32_t groups, uint32_t 
     if (!scratch) return scratch.error();
     const uint32_t tiles = (capacity - 1) / tile + 1;
     const uint64_t columns = form.tiles ? 1 : form.group;
-    if (flags & FlagSingle) {
+    if ((flags & FlagSingle) && canSweep(device)) {
+        if (Status status = createSweep(where); !status) return status;
+    } else if (flags & FlagSingle) {
         single.shares = std::min(tiles, regions.groups());
         single.table = regions.createBuffer((1 + single.shares * columns) * digits * 4, "radix sort: table", where);
         if (!single.table) return single.table.error();
@@ -99,7 +108,7 @@ Status RadixSort::State::createKernels(Passes& passes, bool is_multiple, Where w
     const detail::ParallelForm& form = regions.form();
     const int payload = flags & FlagKeys ? 0 : flags & FlagOrder ? 2 : 1;
     for (uint32_t stage = 0; stage < stages; stage++) {
-        if (!is_multiple && (stage == StageList || stage == StageSmall)) continue;
+        if (stage >= StageTotals || (!is_multiple && (stage == StageList || stage == StageSmall))) continue;
         // A row has as many elements as there are shares.
         const uint32_t group = stage == StageRows && form.tiles ? std::min(4 * form.group, form.most) : form.group;
         Expected<Kernel> kernel = regions.createKernel(
@@ -109,6 +118,33 @@ Status RadixSort::State::createKernels(Passes& passes, bool is_multiple, Where w
             group, where);
         if (!kernel) return kernel.error();
         passes.kernels[stage] = std::move(*kernel);
+    }
+    return {};
+}
+
+/// A group has a tile; the device binds the table at once, and its words have 30 bits for places.
+bool RadixSort::State::canSweep(const Device& device) const {
+    const uint64_t tiles = (capacity - 1) / tile + 1;
+    return regions.form().is_swept && capacity < 1u << 30 && tiles <= device.getFeatures().maxGroupCountX &&
+           sweepTableSize(tiles) <= device.getFeatures().maxStorageSize;
+}
+
+Status RadixSort::State::createSweep(Where where) {
+    is_swept = true;
+    single.shares = (capacity - 1) / tile + 1;
+    single.table = regions.createBuffer(sweepTableSize(single.shares), "radix sort: table", where);
+    if (!single.table) return single.table.error();
+    const int payload = flags & FlagKeys ? 0 : flags & FlagOrder ? 2 : 1;
+    const bool is_silent = regions.form().is_silent;
+    for (const Stage stage : {StageTotals, StageSweep}) {
+        Expected<Kernel> kernel = regions.createKernel(
+            "sort",
+            fmt::format("GLINT_TILE={}u; GLINT_SMALL={}u; GLINT_PAYLOAD={}; GLINT_MANY=0; GLINT_STAGE={}; "
+                        "GLINT_POLLS={}u; GLINT_SILENT={}",
+                        tile, small, payload, static_cast<uint32_t>(stage), is_silent ? 4 : 100000, is_silent ? 1 : 0),
+            regions.form().group, where);
+        if (!kernel) return kernel.error();
+        single.kernels[stage] = std::move(*kernel);
     }
     return {};
 }
@@ -151,15 +187,30 @@ void RadixSort::State::runPasses(Compute& compute, const Passes& passes, detail:
     const uint32_t rows = regions.form().tiles ? digits : digits / regions.form().group;
     const uint32_t count = (bits + 15) / 16 * 2;
     const uint32_t width = (bits + count - 1) / count;
+    const bool is_sweep = is_swept && &passes == &single;
+    if (is_sweep) {
+        compute.clearBuffer(passes.table, 0, 0, sweepTableSize(0), where);
+        work.shift = width;
+        work.bits = bits;
+        regions.bind(compute, passes.kernels[StageTotals], source, where);
+        compute.setStorageBuffers(Slot(3, where), {data, scratch, passes.table});
+        regions.run(compute, work, passes.kernels[StageTotals], std::min(passes.shares, 512u), where);
+    }
     for (uint32_t i = 0; i < count; i++) {
         // A pass without bits that are left copies.
         work.shift = std::min(i * width, 31u);
         work.bits = std::min(width, bits - std::min(i * width, bits));
-        work.flipped = i % 2;
+        work.pass = i;
+        if (is_sweep) {
+            regions.bind(compute, passes.kernels[StageSweep], source, where);
+            compute.setStorageBuffers(Slot(3, where), {i % 2 ? scratch : data, i % 2 ? data : scratch, passes.table});
+            regions.run(compute, work, passes.kernels[StageSweep], passes.shares, where);
+            continue;
+        }
         for (const Stage stage : {StageCount, StageRows, StageMove}) {
             regions.bind(compute, passes.kernels[stage], source, where);
-            const Buffer& from = work.flipped ? scratch : data;
-            const Buffer& to = work.flipped ? data : scratch;
+            const Buffer& from = work.pass % 2 ? scratch : data;
+            const Buffer& to = work.pass % 2 ? data : scratch;
             compute.setStorageBuffers(Slot(3, where), {from, to, passes.table});
             if (passes.kernels[StageList]) compute.setStorageBuffer(Slot(6, where), jobs);
             const uint32_t count_of_groups = stage == StageRows ? rows : std::min(regions.groups(), passes.shares);

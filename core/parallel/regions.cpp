@@ -16,8 +16,11 @@ constexpr uint64_t region_bytes = sizeof(ParallelRegions::Region);
 ParallelForm parallelFormOf(const Device& device) {
     const Features& features = device.getFeatures();
     ParallelForm form;
-    const char* const asked = std::getenv("GLINT_PARALLEL");
-    form.tiles = asked ? std::string_view(asked) == "tiles" : !device.getInfo().cpu;
+    const char* const variable = std::getenv("GLINT_PARALLEL");
+    const std::string_view asked = variable ? variable : "";
+    form.is_silent = asked == "silent";
+    form.is_swept = asked == "sweep" || form.is_silent;
+    form.tiles = form.is_swept || (variable ? asked == "tiles" : !device.getInfo().cpu);
     form.subgroup = std::max(features.minSubgroupSize, 1u);
     form.is_wide = features.maxSubgroupSize > 32;
     // Counters of eight subgroups take 8 KiB. On CPUs a subgroup a group makes barriers cheap.

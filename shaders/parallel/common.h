@@ -16,7 +16,7 @@ layout(push_constant) uniform Work {
     uint capacity;  // elements of a sort's scratch memory
     uint shift;     // bits below the digit
     uint bits;      // of the digit, or all of them where a kernel takes all digits
-    uint flipped;   // 1: from scratch memory back to the data
+    uint pass;      // of a sort; odd ones move from scratch memory back to the data
 } work;
 
 layout(std430, binding = 0) readonly buffer Regions { uint regions[]; };

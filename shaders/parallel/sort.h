@@ -1,7 +1,8 @@
 // Stable sorts of regions {keys, payload, size, -} by digits of up to 8 bits, the lowest first, from the data to scratch
 // memory and back. A pass over large regions takes three kernels: GLINT_STAGE 1 counts the digits of each share of a
 // region, 2 makes running sums of each digit's counts, 3 moves each share's elements to where those say. Stage 4 sorts
-// small regions, a group each, and stage 0 makes a list of the others: the jobs.
+// small regions, a group each, and stage 0 makes a list of the others: the jobs. One region can be sorted otherwise
+// (sort_sweep.h): stage 5 counts all digits at once, and stage 6 is a pass.
 //
 // GLINT_MANY 0: one region, shared by the groups, is the only job. 1: jobs from the list, a tile a share.
 // GLINT_PAYLOAD 0: keys alone. 1: words that go with them. 2: words that become the keys' places.
@@ -24,7 +25,11 @@ layout(std430, binding = 4) writeonly buffer Target { uint target[]; };
 #endif
 // For each job the sums of all digits, then rows of a column for each share, one for each digit.
 #if GLINT_STAGE != 0 && GLINT_STAGE != 4
+#if GLINT_STAGE == 6
+layout(std430, binding = 5) coherent buffer Table { uint table[]; };
+#else
 layout(std430, binding = 5) buffer Table { uint table[]; };
+#endif
 #endif
 // How many, how many shares; eight words a job: keys, payload, size, place in scratch memory, first share, shares; then
 // the job of each share.
@@ -72,12 +77,15 @@ uint shareOfJob(uint share, uint job) { return share - jobs[2u + 8u * job + 4u];
 
 #else
 
-uint shareCount() {
-    const bool is_reporter = GLINT_STAGE == 1 && work.shift == 0u && gl_GlobalInvocationID.x == 0u;
+// Elements of the region, 0 if it is not sorted.
+uint sizeOf() {
+    const bool is_counting = GLINT_STAGE == 1 || GLINT_STAGE == 5;
+    const bool is_reporter = is_counting && work.pass == 0u && gl_GlobalInvocationID.x == 0u;
     if (regionCount(is_reporter) == 0u) return 0u;
     const uint keys = regions[work.first], payload = regions[work.first + 1u], size = regions[work.first + 2u];
-    return isSortable(keys, payload, size, is_reporter) ? min(tilesOf(size), work.groups) : 0u;
+    return isSortable(keys, payload, size, is_reporter) ? size : 0u;
 }
+uint shareCount() { return min(tilesOf(sizeOf()), work.groups); }
 uint jobCount() { return shareCount() == 0u ? 0u : 1u; }
 uint jobOfShare(uint share) { return 0u; }
 
@@ -94,6 +102,9 @@ uint digitOf(uint key, uint shift, uint mask) { return (key >> shift) & mask; }
 
 #if GLINT_TILES
 #include <glint/parallel/sort_tiles.h>
+#if GLINT_STAGE >= 5
+#include <glint/parallel/sort_sweep.h>
+#endif
 #else
 #include <glint/parallel/sort_runs.h>
 #endif
@@ -149,7 +160,7 @@ void main() {
     }
 }
 
-#else
+#elif GLINT_STAGE == 1 || GLINT_STAGE == 3
 
 void main() {
     const uint all = shareCount();
@@ -158,7 +169,7 @@ void main() {
         const Job job = findJob(index);
         const uint own = shareOfJob(share, index);
         // Offsets into source and target.
-        const bool is_flipped = work.flipped != 0u;
+        const bool is_flipped = (work.pass & 1u) != 0u;
         const uvec2 in_data = uvec2(job.keys, job.payload), in_scratch = uvec2(job.room, work.capacity + job.room);
         const uvec2 from = is_flipped ? in_scratch : in_data, to = is_flipped ? in_data : in_scratch;
         const uint mask = (1u << work.bits) - 1u;

@@ -35,12 +35,11 @@ void scanRows(uint rows) {
     }
 }
 
-#elif GLINT_STAGE != 0
+#elif GLINT_STAGE != 0 && GLINT_STAGE != 5
 
 // Counters of each subgroup, then the tile itself.
 const uint COUNTERS = GLINT_GROUP / GLINT_SUBGROUP * DIGITS;
 shared uint stage[COUNTERS > TILE ? COUNTERS : TILE];
-shared uint places[DIGITS];   // where the next tile's keys of a digit go
 shared uint offsets[DIGITS];  // from places in the tile to places in the target
 // Digits of a thread, for those that have any.
 const uint MANY = DIGITS > GLINT_GROUP ? DIGITS / GLINT_GROUP : 1u;
@@ -75,8 +74,9 @@ uint elementOf(uint turn, uint turns) {
     return (gl_SubgroupID * turns + turn) * gl_SubgroupSize + gl_SubgroupInvocationID;
 }
 
-// Where the keys go in the tile; keys beyond its end have the largest digit. Moves `places` on over the tile.
-void rankTile(uint key[ITEMS], uint turns, uint shift, uint mask, out uint place[ITEMS]) {
+// Where the keys go among those of their digit and subgroup; counts them in `stage`. Keys beyond the tile's end have the
+// largest digit.
+void rankInSubgroups(uint key[ITEMS], uint turns, uint shift, uint mask, out uint place[ITEMS]) {
     for (uint i = local; i < gl_NumSubgroups * DIGITS; i += GLINT_GROUP) stage[i] = 0u;
     barrier();
     const uint column = gl_SubgroupID * DIGITS;
@@ -95,27 +95,51 @@ void rankTile(uint key[ITEMS], uint turns, uint shift, uint mask, out uint place
         }
     }
     barrier();
-    uint sum = 0u, total;
-    const uint first = min(local * MANY, DIGITS), last = min(first + MANY, DIGITS);
-    for (uint digit = first; digit < last; digit++)
-        for (uint i = 0u; i < gl_NumSubgroups; i++) sum += stage[i * DIGITS + digit];
-    uint start = sumBefore(sum, total);
-    for (uint digit = first; digit < last; digit++) {
-        const uint begin = start;
-        for (uint i = 0u; i < gl_NumSubgroups; i++) {
-            const uint count = stage[i * DIGITS + digit];
-            stage[i * DIGITS + digit] = start;
-            start += count;
-        }
-        offsets[digit] = places[digit] - begin;
-        places[digit] += start - begin;
+}
+
+uint countOfDigit(uint digit) {
+    uint count = 0u;
+    for (uint i = 0u; i < gl_NumSubgroups; i++) count += stage[i * DIGITS + digit];
+    return count;
+}
+
+// Turns a digit's counts into places in the tile, from `place` on, which ends behind them.
+void placeDigit(uint digit, inout uint place) {
+    for (uint i = 0u; i < gl_NumSubgroups; i++) {
+        const uint count = stage[i * DIGITS + digit];
+        stage[i * DIGITS + digit] = place;
+        place += count;
     }
+}
+
+void addPlaces(uint key[ITEMS], uint turns, uint shift, uint mask, inout uint place[ITEMS]) {
     barrier();
     [[unroll]] for (uint i = 0u; i < ITEMS; i++)
-        if (i < turns) place[i] += stage[column + digitOf(key[i], shift, mask)];
+        if (i < turns) place[i] += stage[gl_SubgroupID * DIGITS + digitOf(key[i], shift, mask)];
     barrier();
 }
 
+#if GLINT_STAGE != 6
+
+shared uint places[DIGITS];  // where the next tile's keys of a digit go
+
+// Where the keys go in the tile. Moves `places` on over the tile.
+void rankTile(uint key[ITEMS], uint turns, uint shift, uint mask, out uint place[ITEMS]) {
+    rankInSubgroups(key, turns, shift, mask, place);
+    uint sum = 0u, total;
+    const uint first = min(local * MANY, DIGITS), last = min(first + MANY, DIGITS);
+    for (uint digit = first; digit < last; digit++) sum += countOfDigit(digit);
+    uint start = sumBefore(sum, total);
+    for (uint digit = first; digit < last; digit++) {
+        const uint begin = start;
+        placeDigit(digit, start);
+        offsets[digit] = places[digit] - begin;
+        places[digit] += start - begin;
+    }
+    addPlaces(key, turns, shift, mask, place);
+}
+
+#endif
 #endif
 
 #if GLINT_STAGE == 1 || GLINT_STAGE == 3
@@ -156,16 +180,18 @@ void countShare(Job job, uint share, uvec2 from, uint shift, uint mask) {
     barrier();
 }
 
-#elif GLINT_STAGE == 3
+#elif GLINT_STAGE == 3 || GLINT_STAGE == 6
 
-// A tile, or the last one, which may have fewer elements.
-void moveTile(uint tile, uint count, bool is_full, uvec2 from, uvec2 to, uint shift, uint mask) {
-    uint key[ITEMS], place[ITEMS];
+void readKeys(uint first, uint count, bool is_full, out uint key[ITEMS]) {
     [[unroll]] for (uint i = 0u; i < ITEMS; i++) {
         const uint element = elementOf(i, ITEMS);
-        key[i] = is_full || element < count ? source[from.x + tile + element] : ~0u;
+        key[i] = is_full || element < count ? source[first + element] : ~0u;
     }
-    rankTile(key, ITEMS, shift, mask, place);
+}
+
+// To the places in the tile, and from there to where `offsets` say, at most `most`.
+void writeTile(uint tile, uint count, bool is_full, uvec2 from, uvec2 to, uint most, uint shift, uint mask,
+               uint key[ITEMS], uint place[ITEMS]) {
     [[unroll]] for (uint i = 0u; i < ITEMS; i++) stage[place[i]] = key[i];
 #if GLINT_PAYLOAD
     uint payload[ITEMS];
@@ -181,7 +207,7 @@ void moveTile(uint tile, uint count, bool is_full, uvec2 from, uvec2 to, uint sh
         const uint at = i * GLINT_GROUP + local;
         if (is_full || at < count) {
             const uint value = stage[at];
-            const uint goal = offsets[digitOf(value, shift, mask)] + at;
+            const uint goal = min(offsets[digitOf(value, shift, mask)] + at, most);
             target[to.x + goal] = value;
             key[i] = goal;
         }
@@ -196,6 +222,18 @@ void moveTile(uint tile, uint count, bool is_full, uvec2 from, uvec2 to, uint sh
     }
     barrier();
 #endif
+}
+
+#endif
+
+#if GLINT_STAGE == 3
+
+// A tile, or the last one, which may have fewer elements.
+void moveTile(uint tile, uint count, bool is_full, uvec2 from, uvec2 to, uint shift, uint mask) {
+    uint key[ITEMS], place[ITEMS];
+    readKeys(from.x + tile, count, is_full, key);
+    rankTile(key, ITEMS, shift, mask, place);
+    writeTile(tile, count, is_full, from, to, ~0u, shift, mask, key, place);
 }
 
 void moveShare(Job job, uint index, uint share, uvec2 from, uvec2 to, uint shift, uint mask) {
@@ -216,7 +254,9 @@ void moveShare(Job job, uint index, uint share, uvec2 from, uvec2 to, uint shift
             moveTile(tile, elements.y - tile, false, from, to, shift, mask);
 }
 
-#elif GLINT_STAGE == 4
+#endif
+
+#if GLINT_STAGE == 4
 
 // In one tile, from registers to shared memory and back.
 void sortSmall(uint keys, uint payload, uint size) {

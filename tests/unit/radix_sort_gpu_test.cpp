@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <random>
+#include <string>
 
 namespace glint::test {
 
@@ -86,6 +89,26 @@ std::vector<Region> layOut(std::span<const uint32_t> sizes, uint32_t& end) {
     end += 3;
     return regions;
 }
+
+/// $GLINT_PARALLEL for as long as it lives.
+class Form {
+public:
+    explicit Form(const char* name) {
+        if (const char* const value = std::getenv("GLINT_PARALLEL")) before_ = value;
+        setenv("GLINT_PARALLEL", name, 1);
+    }
+    ~Form() {
+        if (before_)
+            setenv("GLINT_PARALLEL", before_->c_str(), 1);
+        else
+            unsetenv("GLINT_PARALLEL");
+    }
+    Form(const Form&) = delete;
+    Form& operator=(const Form&) = delete;
+
+private:
+    std::optional<std::string> before_;
+};
 
 class RadixSortTest : public DeviceTest {
 protected:
@@ -199,6 +222,48 @@ TEST_F(RadixSortTest, TakesAnyNumberOfBitsWithAndWithoutPayloads) {
                 for (const uint32_t size : {1u, 9000u}) expectSingle(sort, way | payload, size, Keys::Random, bits);
             EXPECT_THAT(sort.check(), IsOk());
         }
+}
+
+TEST_F(RadixSortTest, CountsTilesThatSayNothing) {
+    // Two of three tiles of a sweep, the first one among them.
+    const Form form("silent");
+    RadixSort sort;
+    ASSERT_THAT(sort.create(device, RadixSort::FlagSingle, 20000), IsOk());
+    for (const uint32_t size : {1u, 128u, 129u, 4097u, 20000u})
+        expectSingle(sort, RadixSort::FlagSingle, size, size % 2 ? Keys::Few : Keys::Random);
+    EXPECT_THAT(sort.check(), IsOk());
+}
+
+TEST_F(RadixSortTest, WritesNothingOutsideOfPayloadsOverKeys) {
+    // A sweep counts all digits before the first pass, and the passes change the keys.
+    const std::vector<uint32_t> values = makeValues(10000, Keys::Random, 6);
+    const std::vector<Region> overlapping = {{2000, 2500, 6000, 0}};
+    const Buffer regions = device.createBuffer(Buffer::FlagStorage, std::span(overlapping));
+    for (const char* name : {"sweep", "silent"}) {
+        const Form form(name);
+        RadixSort sort;
+        ASSERT_THAT(sort.create(device, RadixSort::FlagSingle, 6000), IsOk());
+        const Buffer buffer = device.createBuffer(Buffer::FlagStorage, std::span(values));
+        Compute compute = device.createCompute();
+        sort.dispatchIndirect(compute, buffer, regions);
+        ASSERT_THAT(device.submit(compute), IsOk());
+        const auto after = device.read<uint32_t>(buffer);
+        ASSERT_TRUE(after) << after.error().text();
+        EXPECT_TRUE(std::equal(values.begin(), values.begin() + 2000, after->begin()));
+        EXPECT_TRUE(std::equal(values.begin() + 8500, values.end(), after->begin() + 8500));
+        EXPECT_THAT(sort.check(), IsOk());
+    }
+}
+
+TEST_F(RadixSortTest, TakesMoreThanASweepHasWordsFor) {
+    // On a CPU, whose tiles are short, the table of a sweep takes more than scratch memory, which is all it binds.
+    const uint64_t most = device.getFeatures().maxStorageSize / 8;
+    if (most > 1u << 27) GTEST_SKIP() << "scratch memory of " << most * 8 << " bytes";
+    const Form form("sweep");
+    RadixSort sort;
+    ASSERT_THAT(sort.create(device, RadixSort::FlagSingle, static_cast<uint32_t>(most)), IsOk());
+    for (const uint32_t size : {1u, 9000u}) expectSingle(sort, RadixSort::FlagSingle, size, Keys::Random);
+    EXPECT_THAT(sort.check(), IsOk());
 }
 
 TEST_F(RadixSortTest, TakesEverySizeInOneList) {

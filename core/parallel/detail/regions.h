@@ -22,19 +22,21 @@ struct ParallelWork {
     uint32_t capacity = 0;
     uint32_t shift = 0;
     uint32_t bits = 0;
-    uint32_t flipped = 0;
+    uint32_t pass = 0;
 };
 
 /// How groups share their elements, which `shaders/parallel/common.h` explains: by tiles on GPUs, by runs on CPUs.
 struct ParallelForm {
     bool tiles = false;
-    uint32_t group = 0;     ///< threads
-    uint32_t most = 0;      ///< threads of the largest groups
-    uint32_t subgroup = 0;  ///< the smallest there are
-    bool is_wide = false;   ///< subgroups may have more than 32 threads
+    bool is_swept = false;   ///< sorts of one region read each element once a digit
+    bool is_silent = false;  ///< most tiles of a sweep say nothing to others, for tests
+    uint32_t group = 0;      ///< threads
+    uint32_t most = 0;       ///< threads of the largest groups
+    uint32_t subgroup = 0;   ///< the smallest there are
+    bool is_wide = false;    ///< subgroups may have more than 32 threads
 };
 
-/// Of the device, or as $GLINT_PARALLEL ("tiles", "runs") says.
+/// Of the device, or as $GLINT_PARALLEL ("tiles", "runs", "sweep", "silent") says.
 ParallelForm parallelFormOf(const Device& device);
 
 /// Regions of four words, of the host or of the device.

@@ -19,8 +19,8 @@ ParallelForm parallelFormOf(const Device& device) {
     const char* const variable = std::getenv("GLINT_PARALLEL");
     const std::string_view asked = variable ? variable : "";
     form.is_silent = asked == "silent";
-    form.is_swept = asked == "sweep" || form.is_silent;
-    form.tiles = form.is_swept || (variable ? asked == "tiles" : !device.getInfo().cpu);
+    form.is_swept = variable ? asked == "sweep" || form.is_silent : !device.getInfo().cpu;
+    form.tiles = form.is_swept || asked == "tiles";
     form.subgroup = std::max(features.minSubgroupSize, 1u);
     form.is_wide = features.maxSubgroupSize > 32;
     // Counters of eight subgroups take 8 KiB. On CPUs a subgroup a group makes barriers cheap.
